@@ -1,0 +1,1 @@
+"""The method: arrays in, arrays out. No files, SQL, HTTP or global state (weights are the one file it reads)."""

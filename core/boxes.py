@@ -1,0 +1,89 @@
+"""The object's cloud and its oriented box (paper, appendix, "Bounding boxes for visualising pose estimates").
+
+Letters: N points.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import open3d as o3d
+from numpy.typing import NDArray
+
+from core.errors import NoObject
+from core.sim3 import Sim3
+
+FloatArray = NDArray[np.floating]
+
+
+@dataclass(frozen=True, eq=False)
+class OrientedBox:
+    """A box in some world frame; its axes and centre are the object frame."""
+
+    world_from_object: FloatArray
+    """Rigid transform, shape (4, 4): the origin is the box's centre, the axes run along its edges."""
+    extent_m: FloatArray
+    """Edge lengths along the object's axes, shape (3,), metres."""
+
+    @property
+    def diagonal_m(self) -> float:
+        """Length of the box's diagonal, metres."""
+        return float(np.linalg.norm(self.extent_m))
+
+    def corners(self) -> FloatArray:
+        """The eight corners in the world frame, shape (8, 3); corner b has sign bits b of (x, y, z)."""
+        signs = np.array([[(b >> axis & 1) - 0.5 for axis in range(3)] for b in range(8)])
+        return signs * self.extent_m @ self.world_from_object[:3, :3].T + self.world_from_object[:3, 3]
+
+    def moved_by(self, target_from_reference: Sim3) -> OrientedBox:
+        """The box on the target: its frame stays rigid, the scale goes into the extent."""
+        moved = np.eye(4)
+        moved[:3, :3] = target_from_reference.rotation @ self.world_from_object[:3, :3]
+        moved[:3, 3] = target_from_reference.apply(self.world_from_object[:3, 3])
+        return OrientedBox(moved, self.extent_m * target_from_reference.scale)
+
+
+BOX_EDGES = tuple((a, a | 1 << axis) for a in range(8) for axis in range(3) if not a & 1 << axis)
+"""Pairs of corner indices that make the twelve edges."""
+
+MIN_POINTS = 8
+NEIGHBOURS = 10
+OUTLIER_DEVIATIONS = 2.0
+"""A point whose mean distance to its neighbours is this many standard deviations above the cloud's mean is an outlier.
+The appendix uses a fixed distance (5e-5 m), which depends on resolution; this does not."""
+
+
+def remove_outliers(points: FloatArray) -> FloatArray:
+    """Points, shape (N, 3), without those far from their ten nearest neighbours."""
+    if len(points) <= NEIGHBOURS:
+        return points
+    _, kept = _cloud(points).remove_statistical_outlier(nb_neighbors=NEIGHBOURS, std_ratio=OUTLIER_DEVIATIONS)
+    return points[np.asarray(kept, dtype=int)]
+
+
+def oriented_box(points: FloatArray) -> OrientedBox:
+    """The box along the principal axes of the convex hull of points, shape (N, 3). Raises NoObject for too few or flat ones."""
+    if len(points) < MIN_POINTS:
+        raise NoObject("views", f"only {len(points)} object points have measured depth; at least {MIN_POINTS} are needed: check the depth images")
+    try:
+        box = _cloud(points).get_oriented_bounding_box(robust=True)
+    except RuntimeError as error:
+        raise NoObject("views", "the object's points lie in one plane or line, so it has no box; send views from more sides") from error
+    axes = np.asarray(box.R)
+    if np.linalg.det(axes) < 0:
+        axes = axes * np.array([1.0, 1.0, -1.0])
+    world_from_object = np.eye(4)
+    world_from_object[:3, :3], world_from_object[:3, 3] = axes, np.asarray(box.center)
+    return OrientedBox(world_from_object, np.asarray(box.extent))
+
+
+def cloud_extent_m(points: FloatArray) -> float:
+    """A cloud's diameter, metres: twice the 98th percentile of the distance to the median point; robust to stray points."""
+    if not len(points):
+        return 0.0
+    return float(2 * np.percentile(np.linalg.norm(points - np.median(points, axis=0), axis=1), 98))
+
+
+def _cloud(points: FloatArray) -> o3d.geometry.PointCloud:
+    return o3d.geometry.PointCloud(o3d.utility.Vector3dVector(np.asarray(points, dtype=np.float64)))

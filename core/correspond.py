@@ -1,0 +1,98 @@
+"""Patch correspondences of every reference–target view pair in one batch (paper, "Descriptors and correspondences").
+
+Letters: M reference views, N target views, P and Q their patches after padding, C descriptor size, K correspondences a pair.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+METHODS = ("nearest", "mutual", "cyclical", "cyclical-3d")
+
+
+@dataclass(frozen=True, eq=False)
+class PatchSet:
+    """The patches of several views, padded to the same number."""
+
+    descriptors: Tensor
+    """Unit vectors, zero in the padding, shape (M, P, C)."""
+    places: Tensor
+    """Where each patch is, for the cycle's length: grid cells or metres, shape (M, P, 2 or 3)."""
+    valid: Tensor
+    """False in the padding, shape (M, P)."""
+
+    @staticmethod
+    def pad(descriptors: Sequence[NDArray[np.float32]], places: Sequence[NDArray[np.floating]], device: str = "cpu") -> PatchSet:
+        """From one array a view, shapes (P_m, C) and (P_m, 2 or 3)."""
+        longest = max(max(len(each) for each in descriptors), 1)
+        shape = (len(descriptors), longest)
+        padded = np.zeros((*shape, descriptors[0].shape[1]), dtype=np.float32)
+        padded_places = np.zeros((*shape, places[0].shape[1]), dtype=np.float32)
+        valid = np.zeros(shape, dtype=bool)
+        for view, (vectors, where) in enumerate(zip(descriptors, places)):
+            padded[view, : len(vectors)], padded_places[view, : len(vectors)], valid[view, : len(vectors)] = vectors, where, True
+        return PatchSet(*(torch.from_numpy(array).to(device) for array in (padded, padded_places, valid)))
+
+
+@dataclass(frozen=True, eq=False)
+class PairMatches:
+    """K correspondences of every view pair, best first."""
+
+    reference_patch: Tensor
+    """Shape (M, N, K)."""
+    target_patch: Tensor
+    """Shape (M, N, K)."""
+    similarity: Tensor
+    """Cosine, shape (M, N, K); 0 where not valid."""
+    valid: Tensor
+    """False where a pair has fewer than K, shape (M, N, K)."""
+
+    def view_similarity(self) -> Tensor:
+        """S of the paper, shape (M, N): the sum over a pair's correspondences."""
+        return self.similarity.sum(dim=-1)
+
+
+def match(reference: PatchSet, target: PatchSet, count: int, method: str = "cyclical") -> PairMatches:
+    """The `count` best correspondences of every view pair.
+
+    Args:
+        method: one of METHODS. `nearest`: each reference patch's nearest target patch, ranked by similarity. `mutual`: only
+            pairs that choose each other. `cyclical`: ranked by the distance between a reference patch and where the cycle
+            reference → target → reference ends (mutual ones first, at distance 0; Goodwin 2022), ties by similarity; in patches, or
+            in metres as the appendix proposes (`cyclical-3d`), depending on `reference.places`.
+    """
+    similarity = torch.einsum("mpc,nqc->mnpq", reference.descriptors, target.descriptors)
+    similarity.masked_fill_(~target.valid[None, :, None, :], -2.0)
+    forward, nearest_target = similarity.max(dim=3)
+    similarity.masked_fill_(~reference.valid[:, None, :, None], -2.0)
+    nearest_reference = similarity.argmax(dim=2)
+    cycle_end = nearest_reference.gather(2, nearest_target)
+    cost = 1.0 - forward
+    usable = reference.valid[:, None, :] & target.valid.any(dim=1)[None, :, None]
+    own = torch.arange(cycle_end.shape[2], device=cycle_end.device)
+    if method == "mutual":
+        usable = usable & (cycle_end == own)
+    elif method.startswith("cyclical"):
+        rows = torch.arange(len(reference.places), device=own.device)[:, None, None]
+        moved = torch.linalg.norm(reference.places[rows, cycle_end] - reference.places[:, None], dim=-1)
+        cost = cost * TIE_BREAK + moved
+    cost = cost.masked_fill(~usable, torch.inf)
+    kept = min(count, cost.shape[2])
+    cost, reference_patch = cost.topk(kept, dim=2, largest=False)
+    valid = torch.isfinite(cost)
+    return PairMatches(
+        reference_patch,
+        nearest_target.gather(2, reference_patch),
+        forward.gather(2, reference_patch).masked_fill(~valid, 0.0),
+        valid,
+    )
+
+
+TIE_BREAK = 1e-3
+"""Weight of 1 − cosine beside the cycle's length: too small to outweigh one patch or a few millimetres."""

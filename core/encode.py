@@ -1,0 +1,206 @@
+"""A burst becomes descriptors: two-pass crop, tokens, foreground, 3-D points.
+
+Letters: V views, G patches a side, P foreground patches of one view, D token size.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from core.backbones.base import Backbone, Features
+from core.clock import StageClock
+from core.crop import Window, close_window, largest_component
+from core.depth import SAMPLES, cell_depth, reliable
+from core.errors import InvalidInput, NoObject
+from core.foreground import otsu_threshold, vote_by_support
+from core.views import Burst, Camera, View
+
+FloatArray = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class EncoderConfig:
+    """Settings of the crop."""
+
+    foreground: str = "auto"
+    """`attention` (the paper), `saliency` (the backbone's decoder), or `auto`: saliency where the backbone has it."""
+    attention_threshold: float = 0.05
+    """Share of the largest attention (appendix, "Attention maps for object detection")."""
+    saliency_threshold: float = 0.5
+    """Foreground probability in the first pass; the close crop's is chosen by Otsu's rule."""
+    margin: float = 0.10
+    """Expansion of the box (same place)."""
+    first_grid: int = 16
+    """Patches a side in the first pass: 224 px at 14 px a patch."""
+    grid: int = 28
+    """Patches a side in the close crop; the paper's feature map."""
+
+
+@dataclass(frozen=True, eq=False)
+class EncodedView:
+    """The object as one view shows it."""
+
+    grid: int
+    """G."""
+    window: Window
+    """The close crop."""
+    cells: NDArray[np.int16]
+    """(row, column) of the foreground patches, shape (P, 2)."""
+    descriptors: FloatArray
+    """Their tokens, shape (P, D)."""
+    points_m: FloatArray
+    """Their points in the world frame, metres, shape (P, 3); NaN where depth was not measured."""
+    saliency: FloatArray
+    """Soft foreground over the close crop, shape (G, G)."""
+    cls: FloatArray
+    """[CLS] of the close crop, shape (D,)."""
+    camera: Camera | None
+
+    @property
+    def trusted(self) -> NDArray[np.bool_]:
+        """Patches whose depth was measured, shape (P,): only these may carry geometry."""
+        return np.asarray(np.isfinite(self.points_m).all(axis=1))
+
+    def trusted_only(self) -> EncodedView:
+        """The view with only its trusted patches."""
+        kept = self.trusted
+        return replace(self, cells=self.cells[kept], descriptors=self.descriptors[kept], points_m=self.points_m[kept])
+
+    @property
+    def pixels(self) -> NDArray[np.floating]:
+        """(x, y) in the image of the patches' centres, shape (P, 2)."""
+        return self.window.to_pixels(self.cells, self.grid)
+
+    @property
+    def pooled(self) -> FloatArray:
+        """Mean of the foreground tokens, shape (D,); zero where there are none."""
+        if not len(self.descriptors):
+            return np.zeros(self.descriptors.shape[1], dtype=np.float32)
+        return np.asarray(self.descriptors.mean(axis=0))
+
+
+@dataclass(frozen=True, eq=False)
+class EncodedBurst:
+    """A burst's views, encoded, in the burst's order. A view in which no object was found has no patches."""
+
+    views: tuple[EncodedView, ...]
+    fingerprint: str
+    """The backbone's."""
+    stage_ms: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def cls(self) -> FloatArray:
+        """Shape (V, D)."""
+        return np.stack([view.cls for view in self.views])
+
+    @property
+    def pooled(self) -> FloatArray:
+        """Shape (V, D)."""
+        return np.stack([view.pooled for view in self.views])
+
+    @cached_property
+    def cloud_m(self) -> FloatArray:
+        """Trusted foreground points of all views in the world frame, shape (N, 3)."""
+        return np.concatenate([view.points_m[view.trusted] for view in self.views])
+
+    def select(self, indices: list[int]) -> EncodedBurst:
+        """The encoded burst of the views at `indices`."""
+        return EncodedBurst(tuple(self.views[index] for index in indices), self.fingerprint)
+
+
+class Encoder:
+    """Turns bursts into descriptors with one backbone."""
+
+    def __init__(self, backbone: Backbone, config: EncoderConfig | None = None) -> None:
+        self.backbone = backbone
+        self.config = config or EncoderConfig()
+
+    def encode(self, burst: Burst) -> EncodedBurst:
+        """See module. Raises NoObject where no view shows an object."""
+        clock = StageClock()
+        whole = [Window.whole(*view.size) for view in burst.views]
+        coarse = self._soft_foreground(self._extract(burst, whole, self.config.first_grid))
+        windows = [self._close(view, window, soft) for view, window, soft in zip(burst.views, whole, coarse)]
+        clock.lap("find")
+        features = self._extract(burst, windows, self.config.grid)
+        fine = self._soft_foreground(features)
+        clock.lap("features")
+        views = []
+        for index, view in enumerate(burst.views):
+            soft = self._fuse(view, whole[index], coarse[index], windows[index], fine[index])
+            views.append(self._assemble(view, windows[index], soft, features.patches[index], features.cls[index]))
+        if not any(len(view.cells) for view in views):
+            raise NoObject("views", "no view shows an object that stands out from its background; aim the camera at it or send masks")
+        clock.lap("points")
+        return EncodedBurst(tuple(views), self.backbone.fingerprint, clock.stage_ms)
+
+    def _extract(self, burst: Burst, windows: Sequence[Window], grid: int) -> Features:
+        side = grid * self.backbone.patch_size
+        return self.backbone.extract(np.stack([window.cut(view.rgb, side) for view, window in zip(burst.views, windows)]))
+
+    def _close(self, view: View, whole: Window, soft: FloatArray) -> Window:
+        """The close window; the whole image where nothing stands out."""
+        if view.mask is None:
+            component = largest_component(soft, self._threshold)
+        else:
+            component = np.asarray(whole.cut(view.mask.astype(np.uint8), max(view.size), nearest=True)) > 0
+        return close_window(component, whole, self.config.margin) if component.any() else whole
+
+    def _fuse(self, view: View, whole: Window, coarse: FloatArray, window: Window, fine: FloatArray) -> FloatArray:
+        """Soft foreground of the close crop, shape (G·SAMPLES, G·SAMPLES)."""
+        side = self.config.grid * SAMPLES
+        if view.mask is not None:
+            return np.asarray(window.cut(view.mask.astype(np.float32), side, nearest=True))
+        second = cv2.resize(fine, (side, side), interpolation=cv2.INTER_AREA if len(fine) > side else cv2.INTER_LINEAR)
+        if self._source == "attention":
+            return np.asarray(second)
+        first = window.cut(whole.paste(coarse, view.size), side)
+        soft = np.clip((first + second) / 2, 0, 1)
+        if view.depth_m is None or view.camera is None:
+            return soft
+        depth, usable = _cut_depth(view, view.depth_m, window, side)
+        cells = np.argwhere(np.ones_like(usable))
+        points = view.camera.in_camera(window.to_pixels(cells, side), depth.reshape(-1)).reshape(side, side, 3)
+        return vote_by_support(soft, points, usable, window.size / float(view.camera.K[0, 0]) * float(np.median(depth[usable])) if usable.any() else 1.0)
+
+    def _assemble(self, view: View, window: Window, soft: FloatArray, tokens: FloatArray, cls: FloatArray) -> EncodedView:
+        grid = self.config.grid
+        inside = largest_component(soft, self.config.attention_threshold if self._source == "attention" else otsu_threshold(soft))
+        foreground = inside.reshape(grid, SAMPLES, grid, SAMPLES).mean(axis=(1, 3)) > 0.5
+        cells = np.argwhere(foreground).astype(np.int16)
+        points = np.full((len(cells), 3), np.nan, dtype=np.float32)
+        if view.depth_m is not None and view.camera is not None and len(cells):
+            depth, usable = _cut_depth(view, view.depth_m, window, grid * SAMPLES)
+            depths = cell_depth(depth, usable & inside, grid)[foreground]
+            points = view.camera.back_project(window.to_pixels(cells, grid), depths).astype(np.float32)
+        small = soft.reshape(grid, SAMPLES, grid, SAMPLES).mean(axis=(1, 3)).astype(np.float32)
+        return EncodedView(grid, window, cells, tokens[foreground], points, small, cls, view.camera)
+
+    @property
+    def _source(self) -> str:
+        if self.config.foreground != "auto":
+            return self.config.foreground
+        return "saliency" if self.backbone.has_saliency else "attention"
+
+    @property
+    def _threshold(self) -> float:
+        return self.config.saliency_threshold if self._source == "saliency" else self.config.attention_threshold
+
+    def _soft_foreground(self, features: Features) -> FloatArray:
+        if self._source == "attention":
+            return features.attention
+        if features.saliency is None:
+            raise InvalidInput("foreground", f"backbone {self.backbone.name} has no saliency decoder; use 'attention'")
+        return features.saliency
+
+
+def _cut_depth(view: View, depth_m: FloatArray, window: Window, side: int) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Depth of the crop, never interpolated, and where it may be used; both (side, side)."""
+    usable = window.cut(reliable(depth_m).astype(np.uint8), side, nearest=True)
+    return np.asarray(window.cut(depth_m, side, nearest=True)), np.asarray(usable) > 0

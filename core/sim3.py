@@ -1,0 +1,109 @@
+"""Sim(3): similarity transforms of space, and their least-squares fit.
+
+Letters: K correspondences; a leading * is any batch shape.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from core.errors import InvalidInput, NoPose
+
+FloatArray = NDArray[np.floating]
+RANK_TOLERANCE = 1e-6
+"""Second singular value over the first below which points count as collinear."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sim3:
+    """p_b = scale · rotation · p_a + translation, for a transform named b_from_a."""
+
+    scale: float
+    rotation: FloatArray
+    """Rotation matrix, shape (3, 3)."""
+    translation: FloatArray
+    """Metres of frame b, shape (3,)."""
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.scale) and self.scale > 0):
+            raise InvalidInput("scale", f"expected a positive number, found {self.scale}")
+
+    @staticmethod
+    def identity() -> Sim3:
+        """The neutral element."""
+        return Sim3(1.0, np.eye(3), np.zeros(3))
+
+    @staticmethod
+    def from_matrix(matrix: FloatArray) -> Sim3:
+        """From a 4×4 matrix [[λR, t], [0, 1]]. Raises InvalidInput where λR is no scaled rotation."""
+        linear = np.asarray(matrix, dtype=float)[:3, :3]
+        determinant = float(np.linalg.det(linear))
+        if determinant <= 0:
+            raise InvalidInput("matrix", f"determinant is {determinant:.2g}; a similarity has a positive one")
+        scale = determinant ** (1 / 3)
+        if np.abs(linear.T @ linear / scale**2 - np.eye(3)).max() > 1e-3:
+            raise InvalidInput("matrix", "its 3×3 block is not a rotation times one scale")
+        return Sim3(scale, linear / scale, np.asarray(matrix, dtype=float)[:3, 3])
+
+    def as_matrix(self) -> FloatArray:
+        """[[λR, t], [0, 1]], shape (4, 4)."""
+        matrix = np.eye(4)
+        matrix[:3, :3] = self.scale * self.rotation
+        matrix[:3, 3] = self.translation
+        return matrix
+
+    @property
+    def quaternion(self) -> FloatArray:
+        """The rotation as (w, x, y, z) with w ≥ 0, shape (4,)."""
+        return np.asarray(Rotation.from_matrix(self.rotation).as_quat(canonical=True, scalar_first=True))
+
+    def apply(self, points: FloatArray) -> FloatArray:
+        """Points of frame a, shape (*, 3), in frame b."""
+        return self.scale * points @ self.rotation.T + self.translation
+
+    def inverse(self) -> Sim3:
+        """a_from_b."""
+        rotation = self.rotation.T
+        return Sim3(1 / self.scale, rotation, -(rotation @ self.translation) / self.scale)
+
+    def __matmul__(self, other: Sim3) -> Sim3:
+        """c_from_b @ b_from_a = c_from_a."""
+        return Sim3(self.scale * other.scale, self.rotation @ other.rotation, self.apply(other.translation))
+
+
+def rotation_angle_deg(first: FloatArray, second: FloatArray) -> FloatArray:
+    """Geodesic angle in degrees between rotations, shapes (*, 3, 3)."""
+    trace = np.einsum("...ij,...ij->...", first, second)
+    return np.degrees(np.arccos(np.clip((trace - 1) / 2, -1, 1)))
+
+
+def umeyama(source: FloatArray, target: FloatArray, weights: FloatArray | None = None) -> Sim3:
+    """target_from_source: the similarity of least squares (Umeyama 1991; paper, "Final pose estimation").
+
+    Args:
+        source, target: corresponding points, shape (K, 3).
+        weights: non-negative, shape (K,); equal where left out.
+
+    Raises NoPose for fewer than three points or collinear ones, whose rotation is not determined.
+    """
+    if len(source) < 3:
+        raise NoPose(f"a similarity needs three correspondences, found {len(source)}")
+    weight = np.ones(len(source)) if weights is None else np.asarray(weights, dtype=float)
+    weight = weight / weight.sum()
+    source_mean, target_mean = weight @ source, weight @ target
+    source_centred, target_centred = source - source_mean, target - target_mean
+    covariance = (target_centred * weight[:, None]).T @ source_centred
+    variance = float(weight @ (source_centred**2).sum(axis=1))
+    u, singular, vt = np.linalg.svd(covariance)
+    if variance <= 0 or singular[1] <= RANK_TOLERANCE * singular[0]:
+        raise NoPose("the correspondences lie on one line or point, so their rotation is not determined")
+    signs = np.array([1.0, 1.0, np.sign(np.linalg.det(u @ vt))])
+    rotation = (u * signs) @ vt
+    scale = float((singular * signs).sum() / variance)
+    if scale <= 0:
+        raise NoPose("the correspondences are a reflection of each other; no similarity fits them")
+    return Sim3(scale, rotation, target_mean - scale * rotation @ source_mean)

@@ -1,0 +1,62 @@
+"""From matches of view pairs to view pairs that agree on a rotation (paper, "Aggregating multi-view correspondences").
+
+Letters: M reference views, N target views, Q view pairs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from core.encode import EncodedView
+from core.errors import InvalidInput
+
+FloatArray = NDArray[np.floating]
+ROTATION_SAMPLES = 10_000
+"""Random rotations tried for a consensus: about 75 fall within 30° of any given one."""
+
+
+def best_reference_per_target(view_similarity: FloatArray) -> list[tuple[int, int]]:
+    """For each target view the reference view of largest similarity: N pairs (reference, target) from shape (M, N)."""
+    return [(int(reference), target) for target, reference in enumerate(view_similarity.argmax(axis=0))]
+
+
+def world_from_crop(view: EncodedView) -> FloatArray:
+    """Rotation (3, 3) of the camera turned so that its axis goes through the crop's centre.
+
+    Two crops look alike when the object is seen from the same side, wherever it was in the image.
+    """
+    if view.camera is None:
+        raise InvalidInput("views", "a pose needs world_from_camera for every view")
+    centre = view.window.to_pixels(np.zeros((1, 2)), 1)[0]
+    ray = np.linalg.solve(view.camera.K, np.array([*centre, 1.0]))
+    turn, _ = Rotation.align_vectors(ray[None] / np.linalg.norm(ray), np.array([[0.0, 0.0, 1.0]]))
+    return np.asarray(view.camera.world_from_camera[:3, :3] @ turn.as_matrix())
+
+
+def relative_rotations(reference: Sequence[EncodedView], target: Sequence[EncodedView]) -> FloatArray:
+    """target_from_reference rotations, shape (M, N, 3, 3), if each pair showed its object from the very same side."""
+    of_reference = np.stack([world_from_crop(view) for view in reference])
+    of_target = np.stack([world_from_crop(view) for view in target])
+    return np.asarray(np.einsum("nij,mkj->mnik", of_target, of_reference))
+
+
+def angles_deg(rotations: FloatArray, others: FloatArray) -> FloatArray:
+    """Angle between every two rotations, shape (Q, R), from shapes (Q, 3, 3) and (R, 3, 3)."""
+    traces = rotations.reshape(-1, 9) @ others.reshape(-1, 9).T
+    return np.degrees(np.arccos(np.clip((traces - 1) / 2, -1, 1)))
+
+
+def consensus(rotations: FloatArray, angle_deg: float, seed: int) -> NDArray[np.bool_]:
+    """The largest set within `angle_deg` of one of many random rotations, shape (Q,), from shape (Q, 3, 3)."""
+    samples = Rotation.random(ROTATION_SAMPLES, rng=seed).as_matrix()
+    near = angles_deg(rotations, samples) < angle_deg
+    return np.asarray(near[:, int(near.sum(axis=0).argmax())])
+
+
+def mean_rotation(rotations: FloatArray, weights: FloatArray | None = None) -> FloatArray:
+    """The chordal mean of rotations, shape (3, 3), from shape (Q, 3, 3)."""
+    return np.asarray(Rotation.from_matrix(rotations).mean(weights).as_matrix())
