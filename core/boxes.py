@@ -63,13 +63,14 @@ def remove_outliers(points: FloatArray) -> FloatArray:
 
 
 def oriented_box(points: FloatArray) -> OrientedBox:
-    """The box along the principal axes of the convex hull of points, shape (N, 3). Raises NoObject for too few or flat ones."""
+    """The box along the principal axes of the convex hull of points, shape (N, 3); thin for a flat object. Raises NoObject for too few."""
     if len(points) < MIN_POINTS:
         raise NoObject("views", f"only {len(points)} object points have measured depth; at least {MIN_POINTS} are needed: check the depth images")
+    cloud = _cloud(points)
     try:
-        box = _cloud(points).get_oriented_bounding_box(robust=True)
-    except RuntimeError as error:
-        raise NoObject("views", "the object's points lie in one plane or line, so it has no box; send views from more sides") from error
+        box = cloud.get_oriented_bounding_box()
+    except RuntimeError:  # all in one plane: the hull needs Qhull's joggled input
+        box = cloud.get_oriented_bounding_box(robust=True)
     axes = np.asarray(box.R)
     if np.linalg.det(axes) < 0:
         axes = axes * np.array([1.0, 1.0, -1.0])

@@ -171,7 +171,7 @@ class Encoder:
 
     def _assemble(self, view: View, window: Window, soft: FloatArray, tokens: FloatArray, cls: FloatArray) -> EncodedView:
         grid = self.config.grid
-        inside = largest_component(soft, self.config.attention_threshold if self._source == "attention" else otsu_threshold(soft))
+        inside = self._component(soft)
         foreground = inside.reshape(grid, SAMPLES, grid, SAMPLES).mean(axis=(1, 3)) > 0.5
         cells = np.argwhere(foreground).astype(np.int16)
         points = np.full((len(cells), 3), np.nan, dtype=np.float32)
@@ -181,6 +181,12 @@ class Encoder:
             points = view.camera.back_project(window.to_pixels(cells, grid), depths).astype(np.float32)
         small = soft.reshape(grid, SAMPLES, grid, SAMPLES).mean(axis=(1, 3)).astype(np.float32)
         return EncodedView(grid, window, cells, tokens[foreground], points, small, cls, view.camera)
+
+    def _component(self, soft: FloatArray) -> NDArray[np.bool_]:
+        """The object in the close crop; nothing where nothing is clearly foreground."""
+        if self._source == "attention" or soft.max() <= self.config.saliency_threshold:
+            return largest_component(soft, self._threshold)
+        return largest_component(soft, otsu_threshold(soft))
 
     @property
     def _source(self) -> str:

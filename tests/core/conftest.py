@@ -1,0 +1,64 @@
+"""Builders shared by the tests of the method."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from core.crop import Window
+from core.encode import EncodedBurst, EncodedView
+from core.scan import hemisphere
+from core.sim3 import Sim3
+from core.views import Camera
+from scipy.spatial.transform import Rotation
+
+GRID = 28
+IMAGE = 224
+K = np.array([[400.0, 0, 111.5], [0, 400.0, 111.5], [0, 0, 1]])
+
+
+class PaintedObject:
+    """A random cloud whose points carry descriptors; views of it are encoded without images."""
+
+    def __init__(self, seed: int = 0, points: int = 1500, dim: int = 48) -> None:
+        rng = np.random.default_rng(seed)
+        self.points = rng.uniform(-0.5, 0.5, (points, 3)) * np.array([0.4, 0.25, 0.15])
+        frequencies = rng.normal(size=(3, dim)) * 12
+        self.descriptors = np.sin(self.points @ frequencies + rng.uniform(0, 6.28, dim)).astype(np.float32)
+
+    def encode(self, views: int, world_from_object: Sim3, *, distance_m: float = 1.0) -> EncodedBurst:
+        """Views from a hemisphere about the object placed in a world; the cameras are those of a robot in that world."""
+        poses = hemisphere(np.zeros(3), np.array([0.0, 0, 1]), distance_m, views)
+        poses[:, :3, 3] = world_from_object.apply(poses[:, :3, 3])
+        poses[:, :3, :3] = world_from_object.rotation @ poses[:, :3, :3]
+        return EncodedBurst(tuple(self._view(Camera(K, pose), world_from_object) for pose in poses), "painted")
+
+    def _view(self, camera: Camera, world_from_object: Sim3) -> EncodedView:
+        world = world_from_object.apply(self.points)
+        pixels, depth = camera.project(world)
+        cells = np.floor((pixels + 0.5) / IMAGE * GRID).astype(np.int16)[:, ::-1]
+        order = np.argsort(depth)
+        _, first = np.unique(cells[order], axis=0, return_index=True)
+        seen = order[np.sort(first)]
+        seen = seen[((cells[seen] >= 0) & (cells[seen] < GRID)).all(axis=1)]
+        return EncodedView(
+            GRID,
+            Window(0, 0, IMAGE),
+            cells[seen],
+            self.descriptors[seen],
+            world[seen].astype(np.float32),
+            np.ones((GRID, GRID), np.float32),
+            self.descriptors[seen].mean(axis=0),
+            camera,
+        )
+
+
+@pytest.fixture
+def painted() -> PaintedObject:
+    return PaintedObject()
+
+
+@pytest.fixture
+def moved() -> Sim3:
+    """A similarity worth recovering: 1.6 times as large, turned by 50° about a skew axis, shifted."""
+    axis = np.array([0.4, -0.3, 0.866])
+    return Sim3(1.6, Rotation.from_rotvec(np.radians(50) * axis / np.linalg.norm(axis)).as_matrix(), np.array([0.7, -1.1, 0.4]))

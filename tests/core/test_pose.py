@@ -1,0 +1,90 @@
+"""The pipeline, from encoded views to a transform."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from core.correspond import METHODS
+from core.encode import EncodedBurst
+from core.errors import InvalidInput, TooFewViews
+from core.pose import VARIANTS, PoseConfig, PoseEstimator
+from core.reference import Reference, build_reference
+from core.sim3 import Sim3, rotation_angle_deg
+
+from .conftest import PaintedObject
+
+
+def assert_recovered(found: Sim3, applied: Sim3) -> None:
+    assert rotation_angle_deg(found.rotation, applied.rotation) < 2
+    assert abs(np.log(found.scale / applied.scale)) < 0.03
+    assert np.linalg.norm(found.translation - applied.translation) < 0.02
+
+
+@pytest.mark.parametrize("variant", sorted(VARIANTS))
+def test_a_similarity_applied_by_hand_is_recovered(variant: str, painted: PaintedObject, moved: Sim3) -> None:
+    reference = build_reference(painted.encode(6, Sim3.identity()))
+    estimate = PoseEstimator(PoseConfig.named(variant)).estimate(reference, painted.encode(5, moved))
+    assert_recovered(estimate.target_from_reference, moved)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_every_way_to_match(method: str, painted: PaintedObject, moved: Sim3) -> None:
+    reference = build_reference(painted.encode(6, Sim3.identity()))
+    estimate = PoseEstimator(PoseConfig(method=method)).estimate(reference, painted.encode(5, moved))
+    assert_recovered(estimate.target_from_reference, moved)
+
+
+def test_the_seed_decides_everything(painted: PaintedObject, moved: Sim3) -> None:
+    reference, target = build_reference(painted.encode(4, Sim3.identity())), painted.encode(3, moved)
+    first, second = (PoseEstimator().estimate(reference, target, seed=3) for _ in range(2))
+    assert np.array_equal(first.target_from_reference.as_matrix(), second.target_from_reference.as_matrix())
+
+
+def test_matches_point_at_patches_that_have_depth(painted: PaintedObject, moved: Sim3) -> None:
+    target = painted.encode(3, moved)
+    blind = replace(target.views[0], points_m=np.where(np.arange(len(target.views[0].cells))[:, None] % 2, np.nan, target.views[0].points_m))
+    target = EncodedBurst((blind, *target.views[1:]), target.fingerprint)
+    matches = PoseEstimator().estimate(build_reference(painted.encode(6, Sim3.identity())), target).matches
+    assert len(matches) > 20
+    assert all(target.views[view].trusted[patch] for view, patch in zip(matches.target_view, matches.target_patch))
+    moved_points = np.stack([target.views[view].points_m[patch] for view, patch in zip(matches.target_view, matches.target_patch)])
+    assert np.isfinite(moved_points).all()
+
+
+def test_a_single_target_view_is_enough(painted: PaintedObject, moved: Sim3) -> None:
+    reference = build_reference(painted.encode(8, Sim3.identity()))
+    assert_recovered(PoseEstimator().estimate(reference, painted.encode(1, moved)).target_from_reference, moved)
+
+
+def test_a_reference_needs_two_views(painted: PaintedObject) -> None:
+    with pytest.raises(TooFewViews, match="at least 2 views"):
+        build_reference(painted.encode(1, Sim3.identity()))
+
+
+def test_a_target_without_depth_is_refused(painted: PaintedObject) -> None:
+    target = painted.encode(2, Sim3.identity())
+    blind = EncodedBurst(tuple(replace(view, points_m=np.full_like(view.points_m, np.nan)) for view in target.views), target.fingerprint)
+    with pytest.raises(InvalidInput, match="depth"):
+        PoseEstimator().estimate(build_reference(painted.encode(4, Sim3.identity())), blind)
+
+
+def test_tokens_of_another_backbone_are_refused(painted: PaintedObject) -> None:
+    target = replace(painted.encode(2, Sim3.identity()), fingerprint="other")
+    with pytest.raises(InvalidInput, match="backbone"):
+        PoseEstimator().estimate(build_reference(painted.encode(4, Sim3.identity())), target)
+
+
+def test_an_unknown_variant_is_named() -> None:
+    with pytest.raises(InvalidInput, match="ucd"):
+        PoseConfig.named("nonsense")
+
+
+def test_a_reference_survives_its_arrays(painted: PaintedObject, moved: Sim3) -> None:
+    reference = build_reference(painted.encode(4, Sim3.identity()))
+    again = Reference.from_arrays(reference.as_arrays())
+    target = painted.encode(3, moved)
+    first, second = (PoseEstimator().estimate(each, target).target_from_reference for each in (reference, again))
+    assert rotation_angle_deg(first.rotation, second.rotation) < 0.5
+    assert np.allclose(again.box.corners(), reference.box.corners())

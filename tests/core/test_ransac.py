@@ -1,0 +1,44 @@
+"""RANSAC recovers a similarity among wrong correspondences, and says when it cannot."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from core.errors import NoPose
+from core.estimators.ransac import ransac
+from core.sim3 import Sim3
+
+
+def problem(moved: Sim3, right: int, wrong: int, noise: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(1)
+    source = rng.uniform(-0.2, 0.2, (right + wrong, 3))
+    target = moved.apply(source) + rng.normal(scale=noise, size=source.shape)
+    target[right:] = rng.uniform(-0.5, 0.5, (wrong, 3)) + moved.translation
+    return source, target
+
+
+def test_sixty_percent_outliers(moved: Sim3) -> None:
+    source, target = problem(moved, 80, 120, noise=0.002)
+    fit = ransac(source, target, 0.03, seed=0)
+    assert np.allclose(fit.target_from_reference.as_matrix(), moved.as_matrix(), atol=0.01)
+    assert fit.inlier[:80].all()
+    assert fit.inlier[80:].mean() < 0.1
+    assert fit.residual_m < 0.01
+
+
+def test_the_same_seed_gives_the_same_answer(moved: Sim3) -> None:
+    source, target = problem(moved, 30, 60, noise=0.01)
+    first, second = (ransac(source, target, 0.03, seed=5) for _ in range(2))
+    assert np.array_equal(first.target_from_reference.as_matrix(), second.target_from_reference.as_matrix())
+
+
+@pytest.mark.parametrize("count", [0, 3])
+def test_too_few_correspondences_are_no_pose(count: int) -> None:
+    with pytest.raises(NoPose, match=f"{count} correspondences"):
+        ransac(np.zeros((count, 3)), np.zeros((count, 3)), 0.1, seed=0)
+
+
+def test_collinear_correspondences_are_no_pose() -> None:
+    line = np.outer(np.linspace(0, 1, 20), [1.0, 2, 3])
+    with pytest.raises(NoPose, match="collinear"):
+        ransac(line, line, 0.1, seed=0)

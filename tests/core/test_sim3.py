@@ -1,0 +1,88 @@
+"""Sim(3) is a group that acts on points; its fit recovers what was applied."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from core.errors import InvalidInput, NoPose
+from core.sim3 import Sim3, rotation_angle_deg, umeyama
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+numbers = st.floats(-5, 5)
+
+
+@st.composite
+def similarities(draw: st.DrawFn) -> Sim3:
+    rotation = Rotation.from_rotvec([draw(numbers) for _ in range(3)]).as_matrix()
+    return Sim3(draw(st.floats(0.2, 5)), rotation, np.array([draw(numbers) for _ in range(3)]))
+
+
+POINTS = np.random.default_rng(0).normal(size=(6, 3))
+
+
+def same(first: Sim3, second: Sim3) -> bool:
+    return bool(np.allclose(first.as_matrix(), second.as_matrix(), atol=1e-8))
+
+
+@given(similarities())
+def test_inverse_undoes(transform: Sim3) -> None:
+    assert same(transform @ transform.inverse(), Sim3.identity())
+    assert same(transform.inverse() @ transform, Sim3.identity())
+
+
+@given(similarities(), similarities(), similarities())
+def test_composition_is_associative(a: Sim3, b: Sim3, c: Sim3) -> None:
+    assert np.allclose(((a @ b) @ c).apply(POINTS), (a @ (b @ c)).apply(POINTS), atol=1e-6)
+
+
+@given(similarities(), similarities())
+def test_composition_acts_as_one_after_the_other(a: Sim3, b: Sim3) -> None:
+    assert np.allclose((a @ b).apply(POINTS), a.apply(b.apply(POINTS)), atol=1e-7)
+
+
+@given(similarities())
+def test_matrix_round_trip(transform: Sim3) -> None:
+    assert same(Sim3.from_matrix(transform.as_matrix()), transform)
+
+
+@given(similarities())
+def test_umeyama_recovers_an_exact_similarity(transform: Sim3) -> None:
+    assert same(umeyama(POINTS, transform.apply(POINTS)), transform)
+
+
+def test_known_answer_by_hand() -> None:
+    corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    quarter_turn_doubled = np.array([[3.0, 0, 0], [3, 2, 0], [1, 0, 0], [3, 0, 2]])
+    fit = umeyama(corners, quarter_turn_doubled)
+    assert np.isclose(fit.scale, 2)
+    assert np.allclose(fit.translation, [3, 0, 0])
+    assert np.allclose(fit.quaternion, [np.sqrt(0.5), 0, 0, np.sqrt(0.5)])
+
+
+def test_zero_weight_ignores_an_outlier(moved: Sim3) -> None:
+    target = moved.apply(POINTS)
+    target[0] += 10
+    assert same(umeyama(POINTS, target, np.array([0.0, 1, 1, 1, 1, 1])), moved)
+
+
+def test_mirrored_points_give_a_rotation_not_a_reflection() -> None:
+    fit = umeyama(POINTS, POINTS * np.array([1, 1, -1]))
+    assert np.isclose(np.linalg.det(fit.rotation), 1)
+
+
+@pytest.mark.parametrize("source", [np.outer(np.arange(5.0), [1, 2, 3]), np.ones((5, 3)), POINTS[:2]], ids=["line", "point", "two"])
+def test_undetermined_points_are_refused(source: np.ndarray) -> None:
+    with pytest.raises(NoPose):
+        umeyama(source, source)
+
+
+def test_negative_scale_is_refused() -> None:
+    with pytest.raises(InvalidInput, match="positive"):
+        Sim3(-1.0, np.eye(3), np.zeros(3))
+
+
+def test_angle_between_rotations() -> None:
+    turned = Rotation.from_euler("z", 40, degrees=True).as_matrix()
+    assert np.isclose(rotation_angle_deg(np.eye(3), turned), 40)
