@@ -6,6 +6,7 @@ Letters: V views, S crop side in pixels, G patches a side.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -36,7 +37,7 @@ class Window:
         origin = np.array([self.x0, self.y0])
         return origin + (np.asarray(cells, dtype=float)[:, ::-1] + 0.5) * step - 0.5
 
-    def cut(self, image: NDArray[np.generic], side: int, *, nearest: bool = False) -> NDArray[np.generic]:
+    def cut(self, image: NDArray[Any], side: int, *, nearest: bool = False) -> NDArray[Any]:
         """The region resampled to side×side; outside the image colour is the mean colour, everything else 0."""
         height, width = image.shape[:2]
         left, top = max(0, -self.x0), max(0, -self.y0)

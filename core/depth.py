@@ -30,12 +30,12 @@ def complete(depth_m: NDArray[np.float32]) -> NDArray[np.float32]:
     if not measured.any():
         return depth_m.copy()
     top = float(depth_m.max()) + 1.0
-    inverted = np.where(measured, top - depth_m, 0).astype(np.float32)
-    inverted = cv2.dilate(inverted, DIAMOND_5)
-    inverted = cv2.morphologyEx(inverted, cv2.MORPH_CLOSE, np.ones((5, 5), np.uint8))
+    inverted: FloatArray = np.where(measured, top - depth_m, 0).astype(np.float32)
+    inverted = np.asarray(cv2.dilate(inverted, DIAMOND_5))
+    inverted = np.asarray(cv2.morphologyEx(inverted, cv2.MORPH_CLOSE, np.ones((5, 5), np.uint8)))
     for size in (7, LARGE_KERNEL):
         inverted = np.where(inverted > 0, inverted, cv2.dilate(inverted, np.ones((size, size), np.uint8)))
-    inverted = cv2.medianBlur(inverted, 5)
+    inverted = np.asarray(cv2.medianBlur(inverted, 5))
     filled = np.where(inverted > 0, top - inverted, float(depth_m[measured].mean()))
     return np.where(measured, depth_m, filled).astype(np.float32)
 

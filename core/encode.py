@@ -21,7 +21,10 @@ from core.errors import InvalidInput, NoObject
 from core.foreground import otsu_threshold, vote_by_support
 from core.views import Burst, Camera, View
 
-FloatArray = NDArray[np.float32]
+FloatArray = NDArray[np.floating]
+
+MAX_COVER = 0.95
+"""A foreground that covers more of the whole image than this is a blank wall, not an object."""
 
 
 @dataclass(frozen=True)
@@ -126,14 +129,15 @@ class Encoder:
         clock = StageClock()
         whole = [Window.whole(*view.size) for view in burst.views]
         coarse = self._soft_foreground(self._extract(burst, whole, self.config.first_grid))
-        windows = [self._close(view, window, soft) for view, window, soft in zip(burst.views, whole, coarse)]
+        found = [self._find(view, window, soft) for view, window, soft in zip(burst.views, whole, coarse)]
+        windows = [window or fallback for window, fallback in zip(found, whole)]
         clock.lap("find")
         features = self._extract(burst, windows, self.config.grid)
         fine = self._soft_foreground(features)
         clock.lap("features")
         views = []
         for index, view in enumerate(burst.views):
-            soft = self._fuse(view, whole[index], coarse[index], windows[index], fine[index])
+            soft = self._fuse(view, whole[index], coarse[index], windows[index], fine[index]) * (found[index] is not None)
             views.append(self._assemble(view, windows[index], soft, features.patches[index], features.cls[index]))
         if not any(len(view.cells) for view in views):
             raise NoObject("views", "no view shows an object that stands out from its background; aim the camera at it or send masks")
@@ -144,13 +148,15 @@ class Encoder:
         side = grid * self.backbone.patch_size
         return self.backbone.extract(np.stack([window.cut(view.rgb, side) for view, window in zip(burst.views, windows)]))
 
-    def _close(self, view: View, whole: Window, soft: FloatArray) -> Window:
-        """The close window; the whole image where nothing stands out."""
+    def _find(self, view: View, whole: Window, soft: FloatArray) -> Window | None:
+        """The close window of the object; None where nothing stands out, or everything does."""
         if view.mask is None:
             component = largest_component(soft, self._threshold)
         else:
             component = np.asarray(whole.cut(view.mask.astype(np.uint8), max(view.size), nearest=True)) > 0
-        return close_window(component, whole, self.config.margin) if component.any() else whole
+        if not component.any() or (view.mask is None and component.mean() > MAX_COVER):
+            return None
+        return close_window(component, whole, self.config.margin)
 
     def _fuse(self, view: View, whole: Window, coarse: FloatArray, window: Window, fine: FloatArray) -> FloatArray:
         """Soft foreground of the close crop, shape (G·SAMPLES, G·SAMPLES)."""

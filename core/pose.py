@@ -140,7 +140,7 @@ class PoseEstimator:
     def _patches(self, reference: Reference, views: Sequence[EncodedView]) -> PatchSet:
         dims = self.config.dims
         tokens = [view.descriptors if dims is None else reference.basis.project(view.descriptors, dims) for view in views]
-        places = [view.points_m if self.config.method == "cyclical-3d" else view.cells for view in views]
+        places = [view.points_m if self.config.method == "cyclical-3d" else view.cells.astype(np.float32) for view in views]
         return PatchSet.pad([unit(each) for each in tokens], places)
 
     def _choose_pairs(

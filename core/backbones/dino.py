@@ -34,7 +34,7 @@ class DinoBackbone:
 
     def __init__(
         self,
-        model: nn.Module,
+        model: Any,
         name: str,
         *,
         layer: int = MATCHING_LAYER,
@@ -43,14 +43,14 @@ class DinoBackbone:
         dtype: torch.dtype = torch.float32,
         batch: int = 8,
     ) -> None:
-        config: Any = model.config
+        config = model.config
         self.name = name
         self.patch_size: int = config.patch_size
         self.dim: int = config.hidden_size
         self.has_saliency = decoder is not None
         self._heads: int = config.num_attention_heads
         self._prefix = 1 + getattr(config, "num_register_tokens", 0)
-        self._model = model.eval().requires_grad_(False).to(device)
+        self._model: Any = model.eval().requires_grad_(False).to(device)
         self._decoder = decoder.eval().requires_grad_(False).to(device) if decoder else None
         self._blocks = _blocks(model)
         self._layer, self._device, self._dtype, self._batch = min(layer, len(self._blocks) - 1), device, dtype, batch
@@ -69,7 +69,7 @@ class DinoBackbone:
         mean, deviation = (torch.tensor(value, device=self._device).view(1, 3, 1, 1) for value in (IMAGENET_MEAN, IMAGENET_DEVIATION))
         pixels = (pixels - mean) / deviation
         caught: dict[str, Tensor] = {}
-        attention = self._blocks[-1].attention
+        attention: Any = self._blocks[-1].attention
         hooks = [
             attention.q_proj.register_forward_hook(_keep(caught, "query")),
             attention.k_proj.register_forward_hook(_keep(caught, "key")),
@@ -82,10 +82,10 @@ class DinoBackbone:
             for hook in hooks:
                 hook.remove()
         side = pixels.shape[-1] // self.patch_size
-        patches = caught["tokens"][:, self._prefix :].float().unflatten(1, (side, side))
-        result = {"patches": patches, "cls": tokens[:, 0].float(), "attention": self._cls_attention(caught).unflatten(1, (side, side))}
+        patches = caught["tokens"][:, self._prefix :].float().reshape(-1, side, side, self.dim)
+        result = {"patches": patches, "cls": tokens[:, 0].float(), "attention": self._cls_attention(caught).reshape(-1, side, side)}
         if self._decoder:
-            normalised = tokens[:, self._prefix :].float().transpose(1, 2).unflatten(2, (side, side))
+            normalised = tokens[:, self._prefix :].float().transpose(1, 2).reshape(-1, self.dim, side, side)
             result["saliency"] = self._decoder(normalised, pixels.shape[-1])
         return {key: value.cpu().numpy() for key, value in result.items()}
 
@@ -96,10 +96,10 @@ class DinoBackbone:
 
     def _cls_attention(self, caught: dict[str, Tensor]) -> Tensor:
         """Attention from [CLS] to the patches in the last block, mean over heads, maximum 1, shape (V, G²)."""
-        query, key = (caught[name].float().unflatten(2, (self._heads, -1)) for name in ("query", "key"))
+        query, key = (caught[name].float().reshape(*caught[name].shape[:2], self._heads, -1) for name in ("query", "key"))
         logits = torch.einsum("vhd,vthd->vht", query[:, 0], key) * (self.dim // self._heads) ** -0.5
-        attention = logits.softmax(dim=-1)[:, :, self._prefix :].mean(dim=1)
-        return attention / attention.amax(dim=1, keepdim=True)
+        attention: Tensor = logits.softmax(dim=-1)[:, :, self._prefix :].mean(dim=1)
+        return torch.div(attention, attention.amax(dim=1, keepdim=True))
 
 
 def load_backbone(
@@ -115,7 +115,7 @@ def load_backbone(
     Raises Unavailable, naming the remedy, when the weights are not there and cannot be fetched.
     """
     source: str | Path = embedded_weights(report=report) if name == EMBEDDED else HUB_NAMES.get(name, name)
-    transformers_logging.disable_progress_bar()
+    transformers_logging.disable_progress_bar()  # type: ignore[no-untyped-call]
     try:
         model = AutoModel.from_pretrained(source, attn_implementation="sdpa", dtype=torch.float32)
     except (OSError, ValueError) as error:
@@ -125,7 +125,7 @@ def load_backbone(
     return DinoBackbone(model, name, layer=layer, decoder=decoder, device=device, dtype=dtype)
 
 
-def _blocks(model: nn.Module) -> nn.ModuleList:
+def _blocks(model: Any) -> nn.ModuleList:
     for module in model.modules():
         if isinstance(module, nn.ModuleList):
             return module
@@ -139,7 +139,7 @@ def _keep(caught: dict[str, Tensor], name: str) -> Callable[[nn.Module, Any, Any
     return hook
 
 
-def _fingerprint(model: nn.Module, preprocessing: str) -> str:
+def _fingerprint(model: Any, preprocessing: str) -> str:
     digest = hashlib.sha256(preprocessing.encode())
     for name, tensor in sorted(model.state_dict().items()):
         digest.update(name.encode())

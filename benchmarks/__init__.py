@@ -1,0 +1,1 @@
+"""Accuracy, discovery and speed: each benchmark prints a table and writes JSON."""

@@ -1,0 +1,68 @@
+"""Which pairs of objects a pose benchmark estimates, and which of their views it uses. Both are seeded."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from zlib import crc32
+
+import numpy as np
+
+from clients.datasets import folders
+from core.errors import InvalidInput
+
+Pair = tuple[folders.Sequence, folders.Sequence]
+"""(reference, target)"""
+
+
+@dataclass(frozen=True)
+class ViewCounts:
+    """How many views the reference and the target have."""
+
+    text: str
+    """As the caller wrote it."""
+    reference: int
+    target: int
+
+    @staticmethod
+    def parse(text: str) -> ViewCounts:
+        """`10` is 10 + 10 views; `10+3` is 10 of the reference and 3 of the target. Raises InvalidInput for anything else."""
+        parts = text.split("+")
+        if len(parts) > 2 or not all(part.isdecimal() and int(part) > 0 for part in parts):
+            raise InvalidInput("views", f"expected a count such as 10, or reference+target such as 10+3, found {text!r}")
+        return ViewCounts(text, int(parts[0]), int(parts[-1]))
+
+
+def sample_pairs(sequences: Sequence[folders.Sequence], limit: int, seed: int) -> list[Pair]:
+    """At most `limit` ordered pairs of different instances for each category; a smaller limit takes a prefix of a larger one's.
+
+    Raises InvalidInput where no category has two instances, or one of them has no ground truth.
+    """
+    pairs: list[Pair] = []
+    for category, group in by_category(sequences).items():
+        candidates = [(a, b) for a in group for b in group if a.instance != b.instance]
+        order = np.random.default_rng([seed, crc32(category.encode())]).permutation(len(candidates))
+        pairs += [candidates[index] for index in order[:limit]]
+    if not pairs:
+        raise InvalidInput("data", "no category has two instances, so there is no pair to estimate")
+    for sequence in {sequence for pair in pairs for sequence in pair}:
+        if sequence.world_from_model is None:
+            raise InvalidInput(str(sequence.path), "has no scene_gt.json with scene_camera.json, which the pose benchmark scores against")
+    return pairs
+
+
+def choose_views(name: str, role: str, available: int, count: int, seed: int) -> list[int]:
+    """`count` of the `available` views of sequence `name`, ascending indices.
+
+    The first of a random order, one for each `role` ("reference" or "target"), so that the views of `10+3` are among those of `10+10`.
+    """
+    rng = np.random.default_rng([seed, crc32(name.encode()), crc32(role.encode())])
+    return sorted(rng.permutation(available)[:count].tolist())
+
+
+def by_category(sequences: Sequence[folders.Sequence]) -> dict[str, list[folders.Sequence]]:
+    """Sequences of each category, categories sorted by name."""
+    grouped: dict[str, list[folders.Sequence]] = {}
+    for sequence in sorted(sequences, key=lambda sequence: sequence.name):
+        grouped.setdefault(sequence.category, []).append(sequence)
+    return grouped

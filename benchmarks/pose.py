@@ -1,0 +1,229 @@
+"""Accuracy of the 7-D pose between instances of a category: the paper's experiment on any folder in the data layout.
+
+A seeded sample of the ordered pairs of different instances of each category is estimated, with the product's own crop, and
+with ground truth only for scoring. A pose that the estimator refuses counts as 180°. A row is one category, or "all": the
+mean over categories (paper, "Multi-view one-shot pose estimation").
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, fields, replace
+from functools import lru_cache
+from itertools import groupby
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.accuracy import NO_POSE, accuracy, median
+from benchmarks.encoded import encode_all, read_encoded
+from benchmarks.pairs import Pair, ViewCounts, choose_views, sample_pairs
+from benchmarks.parallel import map_jobs, worker_count
+from benchmarks.tables import machine, print_table, write_json
+from clients.datasets import folders
+from clients.pose_error import PoseError, pose_error
+from core.backbones.dino import load_backbone
+from core.descriptors import KEPT_COMPONENTS
+from core.encode import EncodedBurst, Encoder
+from core.errors import InvalidInput, NoPose
+from core.pose import PoseConfig, PoseEstimator
+from core.reference import Reference, build_reference
+
+DEFAULT_LIMIT = 30
+"""Pairs a category."""
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What one group of rows has in common."""
+
+    views: ViewCounts
+    config: PoseConfig
+    dims: int
+    """Descriptor size."""
+
+    @staticmethod
+    def of(config: PoseConfig, views: ViewCounts, dims: int | None, token_size: int) -> Setting:
+        """`config` with descriptor size `dims`, or its own where None. Raises InvalidInput for a size that a reference cannot give."""
+        if dims is None:
+            return Setting(views, config, config.dims or token_size)
+        if not (0 < dims <= KEPT_COMPONENTS or dims == token_size):
+            raise InvalidInput("dims", f"expected 1 to {KEPT_COMPONENTS}, or {token_size} for whole tokens, found {dims}")
+        return Setting(views, replace(config, dims=None if dims == token_size else dims), dims)
+
+
+@dataclass(frozen=True)
+class Job:
+    """One reference and its targets: what a worker does in one go."""
+
+    setting: Setting
+    reference: folders.Sequence
+    targets: tuple[folders.Sequence, ...]
+    files: dict[Path, Path]
+    """The encoded views of each sequence, by its folder."""
+    seed: int
+
+
+@dataclass(frozen=True)
+class JobResult:
+    """Errors and solve times of a job's targets, in order, and the size of its reference."""
+
+    job: Job
+    errors: tuple[PoseError, ...]
+    solve_ms: tuple[float, ...]
+    memory_mb: float
+
+
+@dataclass(frozen=True)
+class PoseRow:
+    """One line of the table."""
+
+    variant: str
+    views: str
+    dims: int
+    category: str
+    pairs: int
+    acc30: float
+    acc15: float
+    acc7_5: float
+    median_deg: float
+    median_t: float
+    """Fraction of the target's diagonal."""
+    median_log_scale: float
+    solve_ms: float
+    """Median time of one estimate, one thread, features and reference already there."""
+    memory_mb: float
+    """Mean size of a reference's arrays."""
+
+
+COLUMNS = tuple(field.name for field in fields(PoseRow))
+MEAN_COLUMNS = COLUMNS[COLUMNS.index("acc30") :]
+"""What an "all" row averages over categories."""
+
+
+def run(
+    data: Path,
+    variants: Sequence[str],
+    views: Sequence[str],
+    limit: int | None,
+    json: Path | None,
+    seed: int = 0,
+    dims: Sequence[int] | None = None,
+    backbone: str = "dinov2-s14",
+) -> list[PoseRow]:
+    """Estimates the pairs of `data` under every variant, view count and descriptor size; prints and returns the table.
+
+    Args:
+        views: counts as in `ViewCounts.parse`.
+        limit: pairs a category at most; DEFAULT_LIMIT where None.
+        json: where `{"meta", "rows"}` is written too.
+        dims: descriptor sizes; each variant's own where None.
+
+    Raises InvalidInput for an unknown variant, a bad view count, or data without pairs, ground truth or enough views.
+    """
+    counts = [ViewCounts.parse(text) for text in views]
+    configs = [PoseConfig.named(variant) for variant in variants]
+    pairs = sample_pairs(folders.find_sequences(data), DEFAULT_LIMIT if limit is None else limit, seed)
+    sequences = list(dict.fromkeys(sequence for pair in pairs for sequence in pair))
+    _require_views(sequences, counts)
+    network = load_backbone(backbone)
+    sizes: Sequence[int | None] = dims or [None]
+    settings = [Setting.of(config, count, size, network.dim) for config in configs for count in counts for size in sizes]
+    encoded = encode_all(sequences, Encoder(network))
+    files = {sequence.path: file for sequence, file in zip(sequences, encoded, strict=True)}
+    jobs = [job for setting in settings for job in _jobs(setting, pairs, files, seed)]
+    started = time.perf_counter()
+    results = map_jobs(solve, jobs, lambda job: len(job.targets), "solving")
+    seconds = time.perf_counter() - started
+    rows = [row for setting in settings for row in table_rows(setting, [result for result in results if result.job.setting == setting])]
+    if json is not None:
+        meta = {
+            "benchmark": "pose",
+            "data": data,
+            "seed": seed,
+            "limit": limit,
+            "backbone": network.name,
+            "fingerprint": network.fingerprint,
+            "solve_seconds": seconds,
+            "workers": worker_count(len(jobs)),
+            "threads_per_worker": 1,
+        }
+        write_json(json, {**meta, **machine()}, [asdict(row) for row in rows])
+    print_table(f"Pose, {data}", [asdict(row) for row in rows], COLUMNS)
+    return rows
+
+
+def solve(job: Job) -> JobResult:
+    """Builds a job's reference and estimates the pose of each of its targets."""
+    arrays = build_reference(_select(job, job.reference, "reference", job.setting.views.reference)).as_arrays()
+    reference = Reference.from_arrays(arrays)  # as the memory keeps it
+    estimator = PoseEstimator(job.setting.config)
+    errors, solve_ms = [], []
+    for sequence in job.targets:
+        target = _select(job, sequence, "target", job.setting.views.target)
+        started = time.perf_counter()
+        errors.append(_estimate(estimator, reference, target, job, sequence))
+        solve_ms.append(1000 * (time.perf_counter() - started))
+    return JobResult(job, tuple(errors), tuple(solve_ms), sum(array.nbytes for array in arrays.values()) / 1e6)
+
+
+def table_rows(setting: Setting, results: Sequence[JobResult]) -> list[PoseRow]:
+    """One row for each category, sorted, and the "all" row: the mean over categories."""
+    ordered = sorted(results, key=lambda result: result.job.reference.category)
+    groups = groupby(ordered, key=lambda result: result.job.reference.category)
+    rows = [_category_row(setting, category, list(group)) for category, group in groups]
+    means = {column: float(np.mean([getattr(row, column) for row in rows])) for column in MEAN_COLUMNS}
+    return [*rows, replace(rows[0], category="all", pairs=sum(row.pairs for row in rows), **means)]  # type: ignore[arg-type]
+
+
+def _category_row(setting: Setting, category: str, results: Sequence[JobResult]) -> PoseRow:
+    errors = [error for result in results for error in result.errors]
+    return PoseRow(
+        variant=setting.config.variant,
+        views=setting.views.text,
+        dims=setting.dims,
+        category=category,
+        pairs=len(errors),
+        acc30=accuracy(errors, 30),
+        acc15=accuracy(errors, 15),
+        acc7_5=accuracy(errors, 7.5),
+        median_deg=median(errors, "rotation_deg"),
+        median_t=median(errors, "translation"),
+        median_log_scale=median(errors, "log_scale"),
+        solve_ms=float(np.median([ms for result in results for ms in result.solve_ms])),
+        memory_mb=float(np.mean([result.memory_mb for result in results])),
+    )
+
+
+def _require_views(sequences: Sequence[folders.Sequence], counts: Sequence[ViewCounts]) -> None:
+    most = max(max(count.reference, count.target) for count in counts)
+    for sequence in sequences:
+        if len(sequence.images) < most:
+            raise InvalidInput("views", f"{most} were asked for, but {sequence.name} has {len(sequence.images)}; ask for fewer")
+
+
+def _jobs(setting: Setting, pairs: Sequence[Pair], files: dict[Path, Path], seed: int) -> list[Job]:
+    targets: dict[folders.Sequence, list[folders.Sequence]] = {}
+    for reference, target in pairs:
+        targets.setdefault(reference, []).append(target)
+    return [Job(setting, reference, tuple(group), files, seed) for reference, group in targets.items()]
+
+
+def _select(job: Job, sequence: folders.Sequence, role: str, count: int) -> EncodedBurst:
+    indices = choose_views(sequence.name, role, len(sequence.images), count, job.seed)
+    return _cached(job.files[sequence.path]).select(indices)
+
+
+_cached = lru_cache(maxsize=16)(read_encoded)
+
+
+def _estimate(estimator: PoseEstimator, reference: Reference, target: EncodedBurst, job: Job, sequence: folders.Sequence) -> PoseError:
+    reference_from_model, target_from_model = job.reference.world_from_model, sequence.world_from_model
+    assert reference_from_model, "sample_pairs requires ground truth"
+    assert target_from_model, "sample_pairs requires ground truth"
+    try:
+        estimate = estimator.estimate(reference, target, seed=job.seed)
+    except NoPose:
+        return NO_POSE
+    return pose_error(estimate.target_from_reference, reference_from_model, target_from_model, sequence.symmetries)

@@ -1,0 +1,142 @@
+"""Speed: milliseconds of every stage of one observation, side by side in one run.
+
+Operations take turns, round after round, so that whatever else the machine does falls on all of them alike; medians over the
+rounds. A ratio compares with a whole observation: encode, decide by the default score and solve with the default variant.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, fields
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from benchmarks.pairs import by_category
+from benchmarks.parallel import bar
+from benchmarks.tables import machine, print_table, write_json
+from clients.datasets import folders
+from core.backbones.dino import load_backbone
+from core.encode import EncodedBurst, Encoder
+from core.errors import InvalidInput
+from core.novelty import DEFAULT_SCORE, SCORES, Member, decide
+from core.pose import VARIANTS, PoseConfig, PoseEstimator
+from core.reference import Reference, build_reference
+from core.views import Burst
+
+SAMPLES = Path(__file__).resolve().parents[1] / "tests" / "data" / "bursts"
+"""The recordings of the repository."""
+WARM_UP = 1
+"""Rounds that are not counted: first calls allocate and load."""
+Operation = Callable[[], dict[str, float]]
+"""Does its work once and returns milliseconds by stage; an operation without stages returns none."""
+
+
+@dataclass(frozen=True)
+class SpeedRow:
+    """One line of the table."""
+
+    operation: str
+    stage: str
+    """`total`, or a part of the operation."""
+    ms: float
+    ratio: float
+    """Share of a whole observation."""
+
+
+OBSERVATION = ("encode", f"decide {DEFAULT_SCORE}", f"solve {PoseConfig().variant}")
+"""The operations that one observation of a known object consists of."""
+COLUMNS = tuple(field.name for field in fields(SpeedRow))
+
+
+def run(
+    json: Path | None,
+    data: Path | None = None,
+    views: int = 10,
+    rounds: int = 5,
+    backbone: str = "dinov2-s14",
+    device: str = "cpu",
+) -> list[SpeedRow]:
+    """Times one observation of `views` views of an object of `data` (the samples where None) against a reference of as many.
+
+    Raises InvalidInput where no category of `data` has two objects with so many views.
+    """
+    reference_burst, target_burst = (folders.load_burst(each, range(views)) for each in _two_objects(data or SAMPLES, views))
+    network = load_backbone(backbone, device=device)
+    encoder = Encoder(network)
+    scanned, target = encoder.encode(reference_burst), encoder.encode(target_burst)
+    reference = build_reference(scanned)
+    memory = [Member("reference", scanned.cls, scanned.pooled)]
+    operations: dict[str, Operation] = {"encode": partial(_encode, encoder, target_burst), "learn": partial(_learn, scanned)}
+    operations |= {f"decide {score}": partial(_decide, memory, target, score) for score in SCORES}
+    operations |= {f"solve {name}": partial(_solve, PoseEstimator(PoseConfig.named(name)), reference, target) for name in VARIANTS}
+    rows = table_rows(_rounds(operations, rounds), OBSERVATION)
+    if json is not None:
+        meta = {
+            "benchmark": "speed",
+            "views": views,
+            "rounds": rounds,
+            "backbone": network.name,
+            "device": device,
+            "threads": torch.get_num_threads(),
+        }
+        write_json(json, {**meta, **machine()}, [asdict(row) for row in rows])
+    print_table(f"Speed, {views} + {views} views, {torch.get_num_threads()} threads", [asdict(row) for row in rows], COLUMNS)
+    return rows
+
+
+def table_rows(times: Sequence[dict[str, dict[str, float]]], observation: Sequence[str]) -> list[SpeedRow]:
+    """Medians over rounds.
+
+    Args:
+        times: for each round, milliseconds by stage by operation; `total` is a stage of every operation.
+        observation: operations whose totals add up to ratio 1.
+    """
+    medians = {
+        name: {stage: float(np.median([each[name][stage] for each in times])) for stage in stages} for name, stages in times[0].items()
+    }
+    whole = sum(medians[name]["total"] for name in observation)
+    return [SpeedRow(name, stage, ms, ms / whole) for name, stages in medians.items() for stage, ms in stages.items()]
+
+
+def _rounds(operations: dict[str, Operation], rounds: int) -> list[dict[str, dict[str, float]]]:
+    times = []
+    with bar() as progress:
+        for _ in progress.track(range(WARM_UP + rounds), description="timing"):
+            times.append({name: _timed(operation) for name, operation in operations.items()})
+    return times[WARM_UP:]
+
+
+def _timed(operation: Operation) -> dict[str, float]:
+    started = time.perf_counter()
+    stages = operation()
+    return {**stages, "total": 1000 * (time.perf_counter() - started)}
+
+
+def _encode(encoder: Encoder, burst: Burst) -> dict[str, float]:
+    return encoder.encode(burst).stage_ms
+
+
+def _learn(scanned: EncodedBurst) -> dict[str, float]:
+    build_reference(scanned)
+    return {}
+
+
+def _decide(memory: Sequence[Member], target: EncodedBurst, score: str) -> dict[str, float]:
+    decide(memory, target, score=score)
+    return {}
+
+
+def _solve(estimator: PoseEstimator, reference: Reference, target: EncodedBurst) -> dict[str, float]:
+    return estimator.estimate(reference, target).stage_ms
+
+
+def _two_objects(data: Path, views: int) -> list[folders.Sequence]:
+    for group in by_category(folders.find_sequences(data)).values():
+        enough = [sequence for sequence in group if len(sequence.images) >= views]
+        if len(enough) > 1:
+            return enough[:2]
+    raise InvalidInput("views", f"no category below {data} has two objects with {views} views")

@@ -1,0 +1,1 @@
+"""Everything between the service and a robot, a data set or a terminal."""

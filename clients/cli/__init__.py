@@ -1,0 +1,49 @@
+"""`onelook`: the service, a robot's requests, the demo and the benchmarks from a terminal.
+
+Commands import what they need when they run: torch and Open3D take seconds, `onelook --help` does not.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import typer
+from typer.core import TyperGroup
+
+from clients.cli import bench, demo, memory, robot, service
+from clients.cli.terminal import errors
+from core.errors import OneLookError
+
+
+class OneLookGroup(TyperGroup):
+    """Says an expected error in one sentence, and exits with 1."""
+
+    def invoke(self, ctx: Any) -> Any:
+        """Runs the command."""
+        try:
+            return super().invoke(ctx)
+        except OneLookError as error:
+            errors.print(f"[bold red]error:[/] {error}", highlight=False, soft_wrap=True)
+            raise typer.Exit(1) from None
+
+
+app = typer.Typer(
+    name="onelook",
+    cls=OneLookGroup,
+    help="A growing memory of object categories: look once, then recognise other objects of the category and say how they are turned.",
+    no_args_is_help=True,
+    pretty_exceptions_show_locals=False,
+)
+app.command("serve")(service.serve)
+app.command("observe")(robot.observe)
+app.command("scan")(robot.scan)
+app.add_typer(memory.app, name="categories")
+app.command("memory")(memory.show_memory)
+app.command("simulate")(demo.simulate)
+app.command("samples")(demo.samples)
+app.add_typer(bench.app, name="bench")
+
+
+def main() -> None:
+    """Entry point of the `onelook` command."""
+    app(prog_name="onelook")

@@ -1,0 +1,78 @@
+"""`onelook bench`: accuracy, discovery, speed and isolation, each a table and JSON."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+app = typer.Typer(help="Measure accuracy, discovery, speed and isolation.", no_args_is_help=True)
+
+Data = Annotated[Path, typer.Option(help="Folder of recorded objects in the data layout.")]
+JsonFile = Annotated[Path | None, typer.Option("--json", help='File for {"meta": …, "rows": …}.')]
+Seed = Annotated[int, typer.Option(help="Of every random choice.")]
+Backbone = Annotated[str, typer.Option(help="dinov2-s14, dino-s8, or a folder of the DINO family.")]
+BACKBONE = "dinov2-s14"
+
+
+@app.command()
+def pose(
+    data: Data,
+    variant: Annotated[list[str], typer.Option(help="Variant of the pose pipeline; may be repeated.")] = ["ucd"],  # noqa: B006
+    views: Annotated[list[str], typer.Option(help="Views of reference and target, 10 or 10+3; may be repeated.")] = ["10"],  # noqa: B006
+    limit: Annotated[int | None, typer.Option(min=1, help="Pairs a category at most.")] = None,
+    dims: Annotated[list[int] | None, typer.Option(help="Descriptor size; the variant's own where left out.")] = None,
+    seed: Seed = 0,
+    backbone: Backbone = BACKBONE,
+    json: JsonFile = None,
+) -> None:
+    """Accuracy of the 7-D pose between objects of a category."""
+    from benchmarks.pose import run
+
+    run(data, variant, views, limit, json, seed, dims, backbone)
+
+
+@app.command()
+def discovery(
+    data: Data,
+    score: Annotated[list[str] | None, typer.Option(help="Score of the decision; may be repeated; all where left out.")] = None,
+    episodes: Annotated[int, typer.Option(min=1)] = 100,
+    length: Annotated[int, typer.Option(min=1, help="Objects met in an episode.")] = 250,
+    seed: Seed = 0,
+    backbone: Backbone = BACKBONE,
+    json: JsonFile = None,
+) -> None:
+    """How well known and novel objects are told apart."""
+    from benchmarks.discovery import run
+
+    run(data, score or [], json, episodes, length, seed, backbone)
+
+
+@app.command()
+def speed(
+    data: Annotated[Path | None, typer.Option(help="Folder of recorded objects; the samples of the repository where left out.")] = None,
+    views: Annotated[int, typer.Option(min=2, help="Views of the object and of the reference.")] = 10,
+    rounds: Annotated[int, typer.Option(min=1, help="Times each operation is timed.")] = 5,
+    backbone: Backbone = BACKBONE,
+    device: Annotated[str, typer.Option(help="Torch device.")] = "cpu",
+    json: JsonFile = None,
+) -> None:
+    """Time of every stage of an observation."""
+    from benchmarks.speed import run
+
+    run(json, data, views, rounds, backbone, device)
+
+
+@app.command()
+def isolation(
+    data: Data,
+    source: Annotated[list[str] | None, typer.Option(help="Source of the foreground; may be repeated; all where left out.")] = None,
+    limit: Annotated[int | None, typer.Option(min=1, help="Objects a category at most.")] = None,
+    backbone: Backbone = BACKBONE,
+    json: JsonFile = None,
+) -> None:
+    """How well the object is told from its background, against silhouettes."""
+    from benchmarks.isolation import SOURCES, run
+
+    run(data, json, source or SOURCES, limit, backbone)

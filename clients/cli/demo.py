@@ -1,0 +1,101 @@
+"""`onelook simulate`, the demo, and `onelook samples`, which makes the recordings it runs on."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from enum import Enum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from clients.cli.terminal import console
+from clients.errors import ClientError
+
+SAMPLES = Path(__file__).resolve().parents[2] / "tests" / "data" / "bursts"
+
+
+class WorldKind(str, Enum):
+    """Where the simulated robot looks."""
+
+    replay = "replay"
+
+
+def simulate(
+    data: Annotated[Path | None, typer.Option(help="Folder of recorded objects; the samples of the repository where left out.")] = None,
+    out: Annotated[Path, typer.Option(help="Folder for report.html and episode.json.")] = Path("out/demo"),
+    seed: Annotated[int, typer.Option(help="Of the order of the objects and of the views of each.")] = 0,
+    views: Annotated[int, typer.Option(min=2, help="Views in the burst of each encounter.")] = 6,
+    world: Annotated[WorldKind, typer.Option(help="What the robot looks at: recorded views.")] = WorldKind.replay,
+    url: Annotated[str | None, typer.Option(help="A service with an empty memory; one is started and stopped where left out.")] = None,
+) -> None:
+    """Drive a service with a simulated robot: meet objects, learn the novel, recognise the known, report.
+
+    \f
+    `world` has one kind so far; it is named so that scripts keep working when there are more.
+    """
+    from clients.datasets.folders import find_sequences
+    from clients.robot import RobotClient
+    from clients.simulator.episode import Episode, summarise
+    from clients.simulator.live import show, summary_table
+    from clients.simulator.pictures import fetch_pictures
+    from clients.simulator.report import EpisodeRecord, write_json, write_report
+
+    sequences = find_sequences(_data(data))
+    out.mkdir(parents=True, exist_ok=True)
+    with _service(url, out / "service.log") as address, RobotClient(address) as robot:
+        started = time.perf_counter()
+        episode = Episode(robot, sequences, views, seed)
+        encounters = show(episode, len(episode.sequences), console)
+        summary = summarise(encounters, time.perf_counter() - started)
+        with console.status("drawing the report"):
+            pictures = [fetch_pictures(robot, encounter) for encounter in encounters]
+        settings = {"world": world.value, "data": _data(data).name, "seed": seed, "views": views}
+        record = EpisodeRecord(summary, encounters, pictures, robot.categories(), robot.info(), settings)
+    write_report(record, out / "report.html")
+    write_json(record, out / "episode.json")
+    console.print(summary_table(summary))
+    console.print(f"\nreport: {out / 'report.html'}")
+
+
+def samples(
+    data: Annotated[Path, typer.Option(help="Folder of recorded objects to draw from.")],
+    out: Annotated[Path, typer.Option(help="New folder for the small copies.")],
+    categories: Annotated[int, typer.Option(min=1)] = 5,
+    instances: Annotated[int, typer.Option(min=1, help="Objects of each category.")] = 3,
+    views: Annotated[int, typer.Option(min=2, help="Views of each object.")] = 12,
+    seed: Annotated[int, typer.Option(help="Of the draw.")] = 0,
+) -> None:
+    """Make small copies of recorded objects, in the same layout, drawn by a seed."""
+    from clients.datasets.shrink import ShrinkConfig, shrink
+
+    names = shrink(data, out, ShrinkConfig(categories=categories, instances=instances, views=views), seed=seed)
+    console.print(f"{len(names)} objects in {out}: {', '.join(names)}")
+
+
+def _data(data: Path | None) -> Path:
+    if data is None and not SAMPLES.is_dir():
+        raise ClientError(f"no sample bursts at {SAMPLES}; run from a clone of the repository, or name a folder of recordings with --data")
+    return data or SAMPLES
+
+
+@contextmanager
+def _service(url: str | None, log: Path) -> Iterator[str]:
+    """The address of the service named, or of one started for the time being."""
+    if url is not None:
+        yield url
+        return
+    from clients.simulator.local_service import local_service
+    from core.backbones.weights import embedded_weights
+
+    with console.status("looking for the backbone's weights") as status:
+        embedded_weights(report=status.update)
+    with tempfile.TemporaryDirectory(prefix="onelook-") as memory:
+        status = console.status("starting the service")
+        status.start()
+        with local_service(Path(memory), log) as address:
+            status.stop()
+            yield address

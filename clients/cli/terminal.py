@@ -1,0 +1,48 @@
+"""What the commands share: where they print, and the options that several have."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from clients.robot import DEFAULT_URL
+
+console = Console()
+errors = Console(stderr=True)
+
+Url = Annotated[str, typer.Option(help="Address of the service.", envvar="ONELOOK_URL")]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON for programs.")]
+Folder = Annotated[Path, typer.Argument(help="A recorded object: rgb/, depth/, scene_camera.json, sequence.json.")]
+URL = DEFAULT_URL
+
+
+def print_json(value: object) -> None:
+    """JSON on standard output, unwrapped and uncoloured."""
+    typer.echo(json.dumps(value, indent=1))
+
+
+def print_table(rows: Sequence[Mapping[str, str]], empty: str) -> None:
+    """One column a key; `empty` where there are no rows."""
+    if not rows:
+        console.print(empty)
+        return
+    table = Table(*rows[0], header_style="dim", pad_edge=False, box=None)
+    for row in rows:
+        table.add_row(*row.values())
+    console.print(table)
+
+
+def print_facts(facts: Mapping[str, object]) -> None:
+    """One line a fact."""
+    table = Table(show_header=False, box=None, pad_edge=False)
+    table.add_column(style="dim")
+    table.add_column(overflow="fold")
+    for name, value in facts.items():
+        table.add_row(name, str(value))
+    console.print(table)

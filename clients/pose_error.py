@@ -1,0 +1,42 @@
+"""How far an estimated 7-D transform is from the truth, modulo the object's symmetries."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from core.sim3 import Sim3, rotation_angle_deg
+from core.views import FloatArray
+
+
+@dataclass(frozen=True)
+class PoseError:
+    """One estimate against the truth."""
+
+    rotation_deg: float
+    """Geodesic angle in degrees, the smallest over the target's symmetries."""
+    translation: float
+    """Distance between where the reference model's centre lands and the target's, over the target's diagonal."""
+    log_scale: float
+    """|log(estimated scale / true scale)|, natural logarithm."""
+
+
+def pose_error(estimate: Sim3, reference_from_model: Sim3, target_from_model: Sim3, symmetries: Sequence[FloatArray] = ()) -> PoseError:
+    """The error of `estimate`, a target_from_reference.
+
+    Args:
+        reference_from_model, target_from_model: each object's model frame (bounding-box centre 0, diagonal 1, one orientation a
+            category) in its world, so that a scale is the object's diagonal in metres.
+        symmetries: rotations, each (3, 3), of the target's model onto itself; the identity goes without saying.
+    """
+    target_from_reference = target_from_model @ reference_from_model.inverse()
+    model_rotation = target_from_model.rotation.T @ estimate.rotation @ reference_from_model.rotation
+    allowed = np.stack([np.eye(3), *symmetries])
+    landed = estimate.apply(reference_from_model.translation)
+    return PoseError(
+        rotation_deg=float(rotation_angle_deg(allowed, model_rotation[None]).min()),
+        translation=float(np.linalg.norm(landed - target_from_model.translation) / target_from_model.scale),
+        log_scale=float(abs(np.log(estimate.scale / target_from_reference.scale))),
+    )

@@ -1,0 +1,87 @@
+"""A service of the simulator's own: a child process on this machine, stopped with the simulator."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import FrameType
+
+import httpx
+
+from clients.errors import Unreachable
+
+HOST = "127.0.0.1"
+START_S = 120.0
+"""A cold start loads torch and the weights from a slow disk."""
+STOP_S = 10.0
+POLL_S = 0.2
+LOG_LINES = 12
+
+
+@contextmanager
+def local_service(memory: Path, log: Path) -> Iterator[str]:
+    """The address of a service that keeps its memory in `memory` and writes to `log`; it is stopped on leaving, however that happens.
+
+    Raises Unreachable with the end of the log where it does not start.
+    """
+    address = f"http://{HOST}:{(port := _free_port())}"
+    command = [sys.executable, "-m", "clients.cli", "serve", "--host", HOST, "--port", str(port), "--data-dir", str(memory)]
+    before = signal.signal(signal.SIGTERM, _leave)
+    with log.open("w") as output:
+        process = subprocess.Popen(command, stdout=output, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL, env=_environment())
+        try:
+            _wait(process, address, log)
+            yield address
+        finally:
+            _stop(process)
+            signal.signal(signal.SIGTERM, before)
+
+
+def _environment() -> dict[str, str]:
+    """This process's, with this package to be found from any folder."""
+    root = str(Path(__file__).resolve().parents[2])
+    return os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, [root, os.environ.get("PYTHONPATH")]))}
+
+
+def _leave(number: int, frame: FrameType | None) -> None:
+    """Turns a request to stop into an exception, so that the child is stopped too."""
+    raise SystemExit(128 + number)
+
+
+def _free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind((HOST, 0))
+        return int(probe.getsockname()[1])
+
+
+def _wait(process: subprocess.Popen[bytes], address: str, log: Path) -> None:
+    deadline = time.monotonic() + START_S
+    while time.monotonic() < deadline:
+        if process.poll() is not None:
+            break
+        try:
+            if httpx.get(f"{address}/readyz", timeout=2).is_success:
+                return
+        except httpx.TransportError:
+            pass
+        time.sleep(POLL_S)
+    reason = "stopped" if process.poll() is not None else f"is not ready after {START_S:.0f} s"
+    end = "\n".join(log.read_text().splitlines()[-LOG_LINES:])
+    raise Unreachable(f"the service {reason}; its log {log} ends with\n{end}")
+
+
+def _stop(process: subprocess.Popen[bytes]) -> None:
+    if process.poll() is None:
+        process.terminate()
+    try:
+        process.wait(STOP_S)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()

@@ -1,0 +1,101 @@
+"""The pictures of an encounter, fetched from the service and made small enough to stand in a page."""
+
+from __future__ import annotations
+
+import base64
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from clients.errors import NotFoundProblem
+from clients.robot import RobotClient
+from clients.simulator.episode import Encounter
+
+JPEG_QUALITY = 82
+THUMBNAIL_SIDE = 128
+THUMBNAIL_COLUMNS = 5
+Image = NDArray[Any]
+"""Blue, green, red, shape (H, W, 3)."""
+CROP_SIDE = 320
+"""Pixels a side of the pictures of one view; a browser shows them no larger."""
+
+
+@dataclass(frozen=True)
+class Pictures:
+    """Data URIs of one encounter's pictures, all of one view; None where there is none."""
+
+    view: int
+    """Index in the burst."""
+    rgb: str | None
+    foreground: str | None
+    pca: str | None
+    overlay: str | None
+    correspondences: str | None
+    scanned: str | None
+    """The views that a category was learnt from."""
+
+
+def fetch_pictures(robot: RobotClient, encounter: Encounter) -> Pictures:
+    """All pictures that the service has of an encounter, of the view that `shown_view` names."""
+    view = shown_view(encounter)
+
+    def fetch(name: str, side: int | None = CROP_SIDE) -> str | None:
+        try:
+            return data_uri(robot.picture(f"/v1/observations/{encounter.observation.id}/{name}.png", view=view), side)
+        except NotFoundProblem:
+            return None
+
+    return Pictures(
+        view=view,
+        rgb=fetch("rgb"),
+        foreground=fetch("foreground"),
+        pca=fetch("pca"),
+        overlay=fetch("overlay"),
+        correspondences=fetch("correspondences", None),
+        scanned=_scanned(robot, encounter),
+    )
+
+
+def shown_view(encounter: Encounter) -> int:
+    """The view of the burst that is most similar to a reference view, among those the pose rests on; the first where there is no pose."""
+    debug = encounter.observation.raw.get("debug")
+    if not debug or not debug["pairs"]:
+        return 0
+    _, view = max(debug["pairs"], key=lambda pair: debug["view_similarity"][pair[0]][pair[1]])
+    return int(view)
+
+
+def data_uri(png: bytes, side: int | None = None) -> str:
+    """A PNG as an inline JPEG, reduced to at most `side` pixels high."""
+    image = _decode(png)
+    if side is not None and image.shape[0] > side:
+        image = _resized(image, side)
+    return _jpeg_uri(image)
+
+
+def _scanned(robot: RobotClient, encounter: Encounter) -> str | None:
+    if encounter.learnt is None:
+        return None
+    folder = f"/v1/categories/{encounter.learnt.id}/views"
+    pictures = [robot.picture(f"{folder}/{view}/rgb.png") for view in range(encounter.learnt.views)]
+    thumbnails = [_resized(_decode(picture), THUMBNAIL_SIDE) for picture in pictures]
+    missing = -len(thumbnails) % THUMBNAIL_COLUMNS
+    thumbnails += [np.zeros_like(thumbnails[0])] * missing
+    rows = [np.hstack(thumbnails[start : start + THUMBNAIL_COLUMNS]) for start in range(0, len(thumbnails), THUMBNAIL_COLUMNS)]
+    return _jpeg_uri(np.vstack(rows))
+
+
+def _decode(png: bytes) -> Image:
+    return np.asarray(cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR))
+
+
+def _resized(image: Image, height: int) -> Image:
+    return np.asarray(cv2.resize(image, (round(image.shape[1] * height / image.shape[0]), height), interpolation=cv2.INTER_AREA))
+
+
+def _jpeg_uri(image: Image) -> str:
+    _, encoded = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
+    return "data:image/jpeg;base64," + base64.b64encode(bytes(encoded)).decode()

@@ -1,0 +1,83 @@
+"""An episode's decisions as a chart: similarity against the threshold, and the rotation error, one column an encounter.
+
+Coordinates are those of an SVG of width WIDTH, y downwards.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from clients.simulator.episode import ACC_DEG, Encounter
+
+WIDTH = 1120
+LEFT = 56
+SIMILARITY_TOP, SIMILARITY_HEIGHT = 16, 150
+ERROR_TOP, ERROR_HEIGHT = 214, 96
+LABELLED = 16
+"""Columns up to this many have room for the objects' kinds."""
+ERROR_TOP_DEG = 2 * ACC_DEG
+"""Height of the error's panel; a pose farther off than this is wrong however far, and its bar ends at the top."""
+
+
+@dataclass(frozen=True)
+class Mark:
+    """One encounter in one of the panels."""
+
+    encounter: Encounter
+    x: float
+    y: float
+    value: float
+
+
+@dataclass(frozen=True)
+class Tick:
+    """A labelled height."""
+
+    y: float
+    label: str
+
+
+class Timeline:
+    """Where everything stands in the chart."""
+
+    width = WIDTH
+    left = LEFT
+    bottom = ERROR_TOP + ERROR_HEIGHT
+    similarity_top = SIMILARITY_TOP
+    error_top = ERROR_TOP
+
+    def __init__(self, encounters: Sequence[Encounter]) -> None:
+        self.encounters = encounters
+        self._step = (WIDTH - LEFT) / max(1, len(encounters))
+        asked = [(each, each.observation.similarities[0].similarity) for each in encounters if each.observation.similarities]
+        thresholds = [each.observation.threshold for each in encounters if each.observation.threshold is not None]
+        values = [value for _, value in asked] + thresholds or [0.0, 1.0]
+        margin = 0.08 * (max(values) - min(values)) or 0.1
+        self._low, self._high = min(values) - margin, max(values) + margin
+        self.similarities = [Mark(each, self.x(each), self._similarity_y(value), value) for each, value in asked]
+        self.threshold = Tick(self._similarity_y(thresholds[0]), f"{thresholds[0]:.2f}") if thresholds else None
+        posed = [(each, each.error.rotation_deg) for each in encounters if each.error is not None]
+        self.errors = [Mark(each, self.x(each), self._error_y(degrees), degrees) for each, degrees in posed]
+        self.acc = Tick(self._error_y(ACC_DEG), f"{ACC_DEG:.0f}°")
+        self.zero = Tick(self._error_y(0.0), "0°")
+
+    @property
+    def height(self) -> int:
+        """Of the SVG, the labels below included."""
+        return self.bottom + (44 if self.labelled else 26)
+
+    @property
+    def labelled(self) -> bool:
+        """Whether the columns carry the objects' kinds."""
+        return len(self.encounters) <= LABELLED
+
+    def x(self, encounter: Encounter) -> float:
+        """The middle of an encounter's column."""
+        return round(LEFT + (encounter.number - 0.5) * self._step, 1)
+
+    def _similarity_y(self, value: float) -> float:
+        return round(SIMILARITY_TOP + SIMILARITY_HEIGHT * (self._high - value) / (self._high - self._low), 1)
+
+    def _error_y(self, degrees: float) -> float:
+        return round(ERROR_TOP + ERROR_HEIGHT * (1 - min(degrees / ERROR_TOP_DEG, 1)), 1)

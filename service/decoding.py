@@ -1,0 +1,131 @@
+"""Multipart bodies become bursts.
+
+Letters: V views, H, W image height and width.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import ValidationError
+
+from core.errors import InvalidInput
+from core.views import Burst, Camera, View
+from service.errors import field_path
+from service.images import decode_colour, decode_depth, decode_mask
+from service.schemas.bursts import BurstPart, matrix
+
+MAX_BURST_PIXELS = 128_000_000
+"""Colour pixels of a burst, all views together: with depth and masks about 1 GB once decoded."""
+
+FloatArray = NDArray[np.floating]
+
+
+@dataclass(frozen=True)
+class Parts:
+    """A multipart body as it came."""
+
+    burst: str | bytes
+    rgb: Sequence[bytes]
+    depth: Sequence[bytes]
+    mask: Sequence[bytes]
+
+
+@dataclass(frozen=True)
+class Upload:
+    """A decoded body."""
+
+    burst: Burst
+    frame: str | None
+
+
+def decode_parts(parts: Parts, max_views: int) -> Upload:
+    """From multipart/form-data. Raises InvalidInput naming the part that is wrong."""
+    about = _about(parts.burst)
+    views = len(parts.rgb)
+    require_view_count("rgb", views, max_views)
+    for name, found in (("depth", len(parts.depth)), ("mask", len(parts.mask)), ("burst.views", len(about.views or ()))):
+        if found not in (0, views):
+            raise InvalidInput(name, f"has {found} entries for {views} rgb images; send one a view, in the same order, or none")
+    rgb = _images(parts.rgb, "rgb", decode_colour)
+    depth_m = [(image * about.depth_scale).astype(np.float32) for image in _images(parts.depth, "depth", decode_depth)]
+    mask = _images(parts.mask, "mask", decode_mask)
+    cameras = [(matrix(view.K, 3), matrix(view.world_from_camera, 4)) for view in about.views or ()]
+    return Upload(assemble(rgb, depth_m, mask, cameras), about.frame)
+
+
+def require_view_count(field: str, views: int, max_views: int) -> None:
+    """Raises InvalidInput naming `field`."""
+    if not 1 <= views <= max_views:
+        raise InvalidInput(field, f"has {views} images; a burst has 1 to {max_views} views (ONELOOK_MAX_VIEWS)")
+
+
+def assemble(
+    rgb: Sequence[NDArray[np.uint8]],
+    depth_m: Sequence[NDArray[np.float32]],
+    mask: Sequence[NDArray[np.bool_]],
+    cameras: Sequence[tuple[FloatArray | None, FloatArray | None]],
+) -> Burst:
+    """A burst from its parts, each with one entry a view or none at all.
+
+    Args:
+        rgb: shapes (H, W, 3).
+        depth_m, mask: shapes (H, W).
+        cameras: K, shape (3, 3), and world_from_camera, shape (4, 4).
+
+    Raises InvalidInput, also where only a part of the cameras is there, or depth is and they are not.
+    """
+    given = any(value is not None for camera in cameras for value in camera)
+    if given or depth_m:
+        for index in range(len(rgb)):
+            K, pose = cameras[index] if cameras else (None, None)
+            for name, value in (("K", K), ("world_from_camera", pose)):
+                if value is None:
+                    why = "other cameras are given" if given else "depth is given, and says nothing without cameras"
+                    raise InvalidInput(f"views[{index}].{name}", f"is missing, while {why}; send K and world_from_camera for every view")
+    views = []
+    for index, image in enumerate(rgb):
+        with _naming(index):
+            K, pose = cameras[index] if given else (None, None)
+            camera = Camera(K, pose) if K is not None and pose is not None else None
+            views.append(View(image, depth_m[index] if depth_m else None, camera, mask[index] if mask else None))
+    return Burst(views)
+
+
+@contextmanager
+def _naming(index: int) -> Iterator[None]:
+    """A camera or a view does not know its place in the burst; the caller's error names it."""
+    try:
+        yield
+    except InvalidInput as error:
+        raise InvalidInput(f"views[{index}].{error.field.partition('.')[2]}", error.message) from None
+
+
+def _about(part: str | bytes) -> BurstPart:
+    try:
+        return BurstPart.model_validate_json(part)
+    except ValidationError as error:
+        first = error.errors()[0]
+        field = field_path(("burst", *first["loc"]))
+        if first["type"] == "json_invalid":
+            raise InvalidInput(
+                field, f'is not JSON ({first["ctx"]["error"]}); send an object such as {{"depth_scale": 0.001, "views": […]}}'
+            ) from None
+        raise InvalidInput(field, first["msg"].removeprefix("Value error, ")) from None
+
+
+def _images(contents: Sequence[bytes], name: str, decode: Callable[[bytes, str], NDArray[Any]]) -> list[NDArray[Any]]:
+    images, pixels = [], 0
+    for index, content in enumerate(contents):
+        images.append(decode(content, f"{name}[{index}]"))
+        pixels += images[-1].shape[0] * images[-1].shape[1]
+        if pixels > MAX_BURST_PIXELS:
+            raise InvalidInput(
+                name, f"its images have more than {MAX_BURST_PIXELS // 1_000_000} megapixels together; send smaller or fewer ones"
+            )
+    return images

@@ -1,0 +1,34 @@
+"""The service's settings, from the environment (`ONELOOK_*`) or from the caller."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from platformdirs import user_data_path
+from pydantic import Field
+from pydantic_settings import BaseSettings, SettingsConfigDict
+
+from core.backbones.dino import EMBEDDED
+from core.novelty import DEFAULT_SCORE
+
+
+class Settings(BaseSettings):
+    """Everything that is decided before the service starts."""
+
+    model_config = SettingsConfigDict(env_prefix="ONELOOK_", frozen=True)
+
+    data_dir: Path = Field(
+        default_factory=lambda: user_data_path("onelook") / "memory", description="Folder of the memory; made where it is missing."
+    )
+    host: str = Field(
+        "127.0.0.1", description="Address to listen on. There is no authentication: keep it local, or behind a proxy that has."
+    )
+    port: int = Field(8000, ge=0, le=65535, description="Port to listen on; 0 takes a free one.")
+    backbone: str = Field(EMBEDDED, description="`dinov2-s14`, `dino-s8`, or a folder or hub name of the DINO family.")
+    device: str = Field("cpu", description="Torch device of the backbone: `cpu`, `cuda`, `cuda:1`.")
+    score: str = Field(DEFAULT_SCORE, description="How similar two bursts are, for the decision.")
+    threshold: float | None = Field(None, description="Least similarity of a known object; the score's own default where left out.")
+    variant: str = Field("ucd", description="Variant of the pose pipeline.")
+    max_upload_mb: int = Field(128, gt=0, description="Largest request body, in megabytes of 1 000 000 bytes.")
+    max_views: int = Field(32, gt=0, description="Most views in one burst.")
+    scan_views: int = Field(10, ge=2, le=64, description="Viewpoints that a scan asks for.")

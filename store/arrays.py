@@ -1,0 +1,51 @@
+"""Arrays as bytes: one npz file with a checksum, or one BLOB in a row. Nothing is ever pickled."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from core.errors import Unavailable
+
+Array = NDArray[Any]
+BLOB_TYPE = np.dtype("<f4")
+"""Tokens are kept as they were computed: rounding them would make a restarted service decide otherwise."""
+
+
+def write_arrays(path: Path, arrays: Mapping[str, Array]) -> str:
+    """Writes one npz file and returns its SHA-256 in hex."""
+    buffer = io.BytesIO()
+    # The keyword arguments of np.savez are array names, so one called "file" or "allow_pickle" cannot be kept this way.
+    np.savez(buffer, allow_pickle=False, **arrays)
+    content = buffer.getvalue()
+    path.write_bytes(content)
+    return hashlib.sha256(content).hexdigest()
+
+
+def read_arrays(path: Path, sha256: str) -> dict[str, Array]:
+    """The arrays of one npz file. Raises Unavailable where it is missing or is not what was written."""
+    try:
+        content = path.read_bytes()
+    except FileNotFoundError:
+        raise Unavailable(f"{path} is missing from the memory; restore it from a backup") from None
+    found = hashlib.sha256(content).hexdigest()
+    if found != sha256:
+        raise Unavailable(f"{path} is damaged: its SHA-256 is {found[:12]}…, {sha256[:12]}… was written; restore it from a backup")
+    with np.load(io.BytesIO(content), allow_pickle=False) as npz:
+        return dict(npz)
+
+
+def to_blob(tokens: NDArray[np.floating]) -> bytes:
+    """One token a view, shape (V, D), as bytes."""
+    return np.ascontiguousarray(tokens, dtype=BLOB_TYPE).tobytes()
+
+
+def from_blob(blob: bytes, views: int) -> NDArray[np.float32]:
+    """The tokens of `to_blob`, shape (views, D)."""
+    return np.frombuffer(blob, BLOB_TYPE).reshape(views, -1).astype(np.float32, copy=False)

@@ -1,0 +1,113 @@
+"""The documentation names every command, setting and endpoint there is, and nothing that there is not."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.main import get_command
+
+from clients.cli import app
+from clients.datasets.folders import find_sequences, load_burst
+from service.app import create_app
+from service.settings import Settings
+
+ROOT = Path(__file__).parents[2]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+TEXT = "\n".join(page.read_text() for page in PAGES)
+HTTP = (ROOT / "docs" / "http.md").read_text()
+OPERATIONS = (ROOT / "docs" / "operations.md").read_text()
+OTHER_SETTINGS = {"ONELOOK_CACHE", "ONELOOK_URL"}
+"""Read outside the service."""
+
+
+def commands(command: Any, name: str = "onelook") -> Iterator[str]:
+    """Full names of a command's leaves."""
+    inner = getattr(command, "commands", None)
+    if inner is None:
+        yield name
+        return
+    for child, below in inner.items():
+        yield from commands(below, f"{name} {child}")
+
+
+COMMANDS = sorted(commands(get_command(app)))
+SETTINGS = {f"ONELOOK_{name.upper()}" for name in Settings.model_fields}
+ENDPOINTS = sorted((method.upper(), path) for path, methods in create_app(Settings()).openapi()["paths"].items() for method in methods)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_is_documented(command: str) -> None:
+    assert re.search(rf"\b{command}\b", TEXT), f"no page says `{command}`"
+
+
+def test_the_commands_are_found() -> None:
+    assert {"onelook serve", "onelook bench pose"} <= set(COMMANDS)
+
+
+def test_documented_commands_exist() -> None:
+    known = {" ".join(command.split()[:words]) for command in COMMANDS for words in (2, 3)}
+    shown = set(re.findall(r"(?:^|`)(onelook [a-z]+)(?: |`|$)", TEXT, re.MULTILINE))
+    shown |= set(re.findall(r"(?:^|`)(onelook (?:bench|categories) [a-z]+)", TEXT, re.MULTILINE))
+    assert shown <= known
+
+
+def test_every_setting_is_documented() -> None:
+    assert set(re.findall(r"ONELOOK_[A-Z_]+", OPERATIONS)) == SETTINGS | OTHER_SETTINGS
+
+
+def test_documented_settings_exist() -> None:
+    assert set(re.findall(r"ONELOOK_[A-Z_]+", TEXT)) <= SETTINGS | OTHER_SETTINGS
+
+
+def test_documented_defaults_are_the_defaults() -> None:
+    for variable, default in re.findall(r"^\| `(ONELOOK_[A-Z_]+)` \| `([^`]+)` \|", OPERATIONS, re.MULTILINE):
+        assert str(Settings.model_fields[variable.removeprefix("ONELOOK_").lower()].default) == default, variable
+
+
+@pytest.mark.parametrize(("method", "path"), ENDPOINTS)
+def test_every_endpoint_is_documented_with_a_curl(method: str, path: str) -> None:
+    assert f"`{method} {path}`" in HTTP
+    address = r"\$URL" + re.sub(r"\\\{\w+\\\}", r"[$\\w]+", re.escape(path)) + r"(?![/\w])"
+    calls = [line for line in HTTP.splitlines() if line.startswith("curl ") and re.search(address, line)]
+    assert any(method_of(call) == method for call in calls), f"no curl calls {method} {path}"
+
+
+def method_of(call: str) -> str:
+    """What a curl line sends: what -X says, else POST with a body, else GET."""
+    named = re.search(r"-X (\w+)", call)
+    if named:
+        return named[1]
+    return "POST" if re.search(r" (-F|-d|--data-binary) ", call) or "/complete" in call else "GET"
+
+
+def test_documented_endpoints_exist() -> None:
+    for method, path in re.findall(r"`(GET|POST|PATCH|DELETE|PUT) (/[^`]*)`", TEXT):
+        assert (method, path) in ENDPOINTS
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_links_lead_somewhere(page: Path) -> None:
+    for target in re.findall(r"\]\((?!https?:)([^)]+)\)", page.read_text()):
+        file, _, anchor = target.partition("#")
+        linked = (page.parent / file).resolve() if file else page
+        assert linked.exists(), f"{page.name} links to {target}"
+        if anchor:
+            headings = re.findall(r"^#+ (.+)$", linked.read_text(), re.MULTILINE)
+            assert anchor in {re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-") for heading in headings}, target
+
+
+def test_the_example_burst_is_of_the_recording_it_is_shown_with(samples: Path) -> None:
+    example = json.loads((ROOT / "docs" / "burst.json").read_text())
+    recording = samples / "cup" / "cup_1"
+    burst = load_burst(find_sequences(recording)[0], range(len(example["views"])))
+    for shown, camera in zip(example["views"], burst.cameras, strict=True):
+        np.testing.assert_allclose(shown["K"], camera.K, rtol=1e-4)
+        np.testing.assert_allclose(shown["world_from_camera"], camera.world_from_camera, atol=1e-5)
+    scales = {camera["depth_scale"] for camera in json.loads((recording / "scene_camera.json").read_text()).values()}
+    assert [1000 * example["depth_scale"]] == pytest.approx(list(scales))

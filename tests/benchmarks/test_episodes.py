@@ -1,0 +1,91 @@
+"""False positives and negatives of similarity matrices made by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from benchmarks.discovery import score_rows
+from benchmarks.episodes import draw_orders, episode
+from benchmarks.pair_scores import PairScores
+
+LABELS = np.array([0, 0, 1, 1])
+TWO_KINDS = np.array(
+    [
+        [1.0, 0.8, 0.3, 0.1],
+        [0.8, 1.0, 0.2, 0.1],
+        [0.3, 0.2, 1.0, 0.6],
+        [0.1, 0.1, 0.6, 1.0],
+    ]
+)
+"""Bursts 0 and 1 are of one kind, 2 and 3 of another; no pair of different kinds is as similar as a pair of one."""
+CURVE = np.array([-1.0, 0.2, 0.3, 0.5, 0.7, 0.9])
+
+
+def pairs_of(similarity: np.ndarray) -> PairScores:
+    """Bursts of one view each, whose mean cosines are `similarity`."""
+    return PairScores("paper_mean", np.ones(len(similarity), dtype=int), similarity, np.zeros((*similarity.shape, 0)))
+
+
+def test_a_threshold_between_the_kinds_makes_no_error() -> None:
+    counts = episode(pairs_of(TWO_KINDS), LABELS, [0, 1, 2, 3], CURVE)
+    assert (counts.presented, counts.seen) == (4, 2)
+    # At 0.2, burst 2 joins the first kind at the mean 0.25, and 3 joins all three at (0.1 + 0.1 + 0.6) / 3.
+    assert counts.false_positive.tolist() == [2, 2, 0, 0, 0, 0]
+    assert counts.false_negative.tolist() == [0, 0, 0, 0, 1, 2]
+    assert counts.fp.tolist() == [50, 50, 0, 0, 0, 0]
+    assert counts.fn.tolist() == [0, 0, 0, 0, 50, 100]
+
+
+def test_a_category_is_compared_by_the_mean_over_its_members() -> None:
+    # Burst 2 has 0.3 to burst 0 and 0.2 to burst 1.
+    counts = episode(pairs_of(TWO_KINDS), LABELS, [0, 1, 2], np.array([0.24, 0.26]))
+    assert counts.false_positive.tolist() == [1, 0]
+
+
+def test_joining_the_majority_is_right_even_in_a_mixed_category() -> None:
+    everything_alike = np.full((4, 4), 0.5)
+    counts = episode(pairs_of(everything_alike), np.array([0, 1, 1, 1]), [0, 1, 2, 3], np.array([0.4]))
+    # 1 joins 0's category: wrong. 2 finds one member of each kind, a tie, and 3 a majority of its own: right.
+    assert counts.false_positive.tolist() == [1]
+    assert counts.false_negative.tolist() == [0]
+
+
+def test_a_category_founded_twice_is_known_by_either() -> None:
+    # Burst 1 is falsely novel; burst 0 again goes to its own founder, which is a repeat and not counted.
+    counts = episode(pairs_of(TWO_KINDS), LABELS, [0, 1, 0, 1], np.array([0.9]))
+    assert (counts.presented, counts.seen, counts.false_negative.tolist(), counts.false_positive.tolist()) == (2, 1, [1], [0])
+
+
+def test_counts_add_up() -> None:
+    once = episode(pairs_of(TWO_KINDS), LABELS, [0, 1, 2, 3], CURVE)
+    twice = once + once
+    assert (twice.presented, twice.seen) == (8, 4)
+    np.testing.assert_array_equal(twice.fn, once.fn)
+
+
+def test_orders_are_seeded_and_within_the_bursts() -> None:
+    orders = draw_orders(3, bursts=5, length=20, seed=1)
+    assert orders == draw_orders(3, bursts=5, length=20, seed=1) != draw_orders(3, bursts=5, length=20, seed=2)
+    assert {burst for order in orders for burst in order} == set(range(5))
+
+
+@pytest.fixture
+def two_kinds_of_rows() -> list[dict[str, object]]:
+    """The table of three episodes over TWO_KINDS."""
+    return [dict(row) for row in score_rows(pairs_of(TWO_KINDS), LABELS, draw_orders(3, 4, 12, seed=0))]
+
+
+def test_separable_kinds_have_a_perfect_summary(two_kinds_of_rows: list[dict[str, object]]) -> None:
+    *curve, summary = two_kinds_of_rows
+    assert (summary["auroc"], summary["nearest"], summary["fn_at_zero_fp"], summary["fn_at_one_fp"]) == (1, 1, 0, 0)
+    assert all(set(row) == {"score", "threshold", "fp", "fn"} for row in curve)
+    thresholds = [row["threshold"] for row in curve]
+    assert thresholds == sorted(thresholds)
+    assert (curve[-1]["fp"], curve[-1]["fn"]) == (0, 100)
+
+
+def test_inseparable_kinds_have_none() -> None:
+    alike = np.full((4, 4), 0.5) + 0.5 * np.eye(4)
+    summary = score_rows(pairs_of(alike), LABELS, draw_orders(3, 4, 12, seed=0))[-1]
+    assert (summary["auroc"], summary["fn_at_zero_fp"]) == (0.5, 100)

@@ -1,0 +1,55 @@
+"""Overlap of found and true foreground."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from benchmarks import isolation
+from benchmarks.isolation import Overlap, found_mask, overlap, table_rows
+from core.crop import Window
+from core.errors import InvalidInput
+
+
+def test_overlap() -> None:
+    found, truth = np.zeros((4, 4), bool), np.zeros((4, 4), bool)
+    found[:2], truth[1:] = True, True
+    assert overlap(found, truth) == Overlap(iou=4 / 16, precision=4 / 8, recall=4 / 12)
+
+
+def test_patches_are_painted_where_they_are() -> None:
+    view = SimpleNamespace(grid=2, window=Window(2, 1, 4), cells=np.array([[0, 1], [1, 0]]))
+    expected = np.zeros((6, 8), bool)
+    expected[1:3, 4:6] = expected[3:5, 2:4] = True
+    np.testing.assert_array_equal(found_mask(view, 6, 8), expected)
+
+
+def test_a_window_may_stick_out_of_the_image() -> None:
+    view = SimpleNamespace(grid=2, window=Window(-2, -2, 8), cells=np.array([[0, 0], [0, 1], [1, 0], [1, 1]]))
+    assert found_mask(view, 4, 4).all()
+
+
+def test_rows_are_means_over_views_then_categories() -> None:
+    blind = Overlap(0.0, float("nan"), 0.0)
+    cup, egg, everything = table_rows("attention", [("egg", Overlap(0.5, 1.0, 0.5)), ("cup", blind), ("cup", Overlap(1.0, 1.0, 1.0))])
+    assert (cup.iou, cup.precision, cup.recall, cup.missed, cup.views) == (50, 100, 50, 50, 2)
+    assert (egg.iou, egg.missed) == (50, 0)
+    assert (everything.category, everything.iou, everything.missed, everything.views) == ("all", 50, 25, 3)
+
+
+def test_an_object_on_black_is_found(recorded: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, backbone) -> None:
+    monkeypatch.setattr(isolation, "load_backbone", lambda name: backbone)
+    monkeypatch.setenv("ONELOOK_CACHE", str(tmp_path / "cache"))
+    *_, everything = isolation.run(recorded, None, ["saliency"])
+    assert everything.iou > 85
+    assert everything.views == 8
+
+
+def test_silhouettes_are_needed(tmp_path: Path, recorded: Path) -> None:
+    for mask in recorded.rglob("mask_visib/*.png"):
+        mask.unlink()
+    with pytest.raises(InvalidInput, match="silhouettes"):
+        isolation.run(recorded, None)

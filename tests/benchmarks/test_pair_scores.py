@@ -1,0 +1,49 @@
+"""Similarities of sets from parts of pairs, against the decision's own."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from benchmarks.pair_scores import PairScores, auroc
+from core.errors import InvalidInput
+from core.novelty import SCORES, Member, decide
+
+
+@pytest.fixture
+def bursts() -> list[SimpleNamespace]:
+    """Five bursts of different numbers of views, with random tokens."""
+    rng = np.random.default_rng(1)
+    return [SimpleNamespace(cls=rng.normal(size=(views, 8)), pooled=rng.normal(size=(views, 8))) for views in (3, 5, 1, 4, 2)]
+
+
+@pytest.mark.parametrize("score", SCORES)
+def test_a_set_is_as_similar_as_the_service_says(bursts: list[SimpleNamespace], score: str) -> None:
+    pairs, members, target = PairScores.of(bursts, score), [0, 1, 3], 4
+    memory = [Member("it", bursts[index].cls, bursts[index].pooled) for index in members]
+    ((_, expected),) = decide(memory, bursts[target], score=score).similarities
+    total, best = pairs.total[members, target].sum(), pairs.best[members, target].max(axis=0)
+    assert pairs.similarity(total, best, pairs.views[members].sum(), target) == pytest.approx(expected, rel=1e-5)
+
+
+@pytest.mark.parametrize("score", SCORES)
+def test_a_single_burst_is_as_similar_as_the_service_says(bursts: list[SimpleNamespace], score: str) -> None:
+    single = PairScores.of(bursts, score).single()
+    memory = [Member(str(index), burst.cls, burst.pooled) for index, burst in enumerate(bursts)]
+    for target, burst in enumerate(bursts):
+        for name, expected in decide(memory, burst, score=score).similarities:
+            assert single[int(name), target] == pytest.approx(expected, rel=1e-5)
+
+
+def test_an_unknown_score_is_refused(bursts: list[SimpleNamespace]) -> None:
+    with pytest.raises(InvalidInput, match="nonsense"):
+        PairScores.of(bursts, "nonsense")
+
+
+@pytest.mark.parametrize(
+    ("positive", "negative", "expected"), [([3, 4], [1, 2], 1.0), ([1], [1], 0.5), ([1, 3], [2], 0.5), ([0], [1, 2], 0.0)]
+)
+def test_auroc(positive: list[float], negative: list[float], expected: float) -> None:
+    assert auroc(np.array(positive), np.array(negative)) == expected

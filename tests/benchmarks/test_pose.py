@@ -1,0 +1,91 @@
+"""The pose benchmark from folders to JSON, on two objects whose pose is known."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks import pose
+from benchmarks.accuracy import NO_POSE
+from benchmarks.pairs import ViewCounts
+from clients.datasets.folders import find_sequences
+from clients.pose_error import PoseError
+from core.errors import InvalidInput, NoPose
+from core.pose import PoseConfig, PoseEstimator
+
+COLUMNS = {
+    *("variant", "views", "dims", "category", "pairs", "acc30", "acc15", "acc7_5"),
+    *("median_deg", "median_t", "median_log_scale", "solve_ms", "memory_mb"),
+}
+
+
+@pytest.fixture(autouse=True)
+def small_world(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, backbone) -> None:
+    """The benchmark with the colour backbone and a cache of its own."""
+    monkeypatch.setattr(pose, "load_backbone", lambda name: backbone)
+    monkeypatch.setenv("ONELOOK_CACHE", str(tmp_path / "cache"))
+
+
+def test_a_known_similarity_is_recovered(recorded: Path, tmp_path: Path) -> None:
+    file = tmp_path / "out" / "pose.json"
+    pose.run(recorded, ["ucd"], ["4"], 1, file)
+    written = json.loads(file.read_text())
+    category, everything = written["rows"]
+    assert set(category) == COLUMNS
+    assert (category["category"], everything["category"]) == ("egg", "all")
+    assert (category["variant"], category["views"], category["dims"], category["pairs"]) == ("ucd", "4", 32, 1)
+    assert category["acc7_5"] == 100
+    assert category["median_t"] < 0.03
+    assert category["median_log_scale"] < 0.05
+    assert written["meta"]["fingerprint"] == "colour-1"
+
+
+def test_the_same_seed_gives_the_same_figures(recorded: Path) -> None:
+    first, again = (pose.run(recorded, ["ucd"], ["3+2"], 1, None, seed=5)[0] for _ in range(2))
+    assert replace(first, solve_ms=0) == replace(again, solve_ms=0)
+
+
+def test_descriptor_sizes(recorded: Path) -> None:
+    rows = pose.run(recorded, ["ucd"], ["4"], 1, None, dims=[6, 64])
+    assert [row.dims for row in rows] == [6, 6, 64, 64]
+
+
+@pytest.mark.parametrize(
+    ("change", "field"),
+    [({"variants": ["nonsense"]}, "variant"), ({"views": ["9"]}, "views"), ({"views": ["many"]}, "views"), ({"dims": [65]}, "dims")],
+)
+def test_what_cannot_be_run_is_said_with_its_field(recorded: Path, change: dict[str, object], field: str) -> None:
+    given = {"variants": ["ucd"], "views": ["4"], "dims": None} | change
+    with pytest.raises(InvalidInput) as caught:
+        pose.run(recorded, limit=1, json=None, **given)
+    assert caught.value.field == field
+
+
+def test_a_refused_pose_counts_as_180(recorded: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object, **__: object) -> None:
+        raise NoPose("nothing fits")
+
+    monkeypatch.setattr(PoseEstimator, "estimate", refuse)
+    (row, _) = pose.run(recorded, ["ucd"], ["4"], 1, tmp_path / "pose.json")
+    assert (row.acc30, row.median_deg) == (0, 180)
+    assert json.loads((tmp_path / "pose.json").read_text())["rows"][0]["median_t"] is None
+
+
+def test_all_is_the_mean_over_categories_not_over_pairs(recorded: Path) -> None:
+    large, small = find_sequences(recorded)
+    setting = pose.Setting(ViewCounts("4", 4, 4), PoseConfig(), 32)
+    exact = PoseError(0.0, 0.0, 0.0)
+    results = [
+        pose.JobResult(pose.Job(setting, large, (small,), {}, 0), (exact,), (1.0,), 2.0),
+        pose.JobResult(pose.Job(setting, replace(small, category="cup"), (large,) * 3, {}, 0), (NO_POSE, NO_POSE, exact), (3.0,) * 3, 4.0),
+    ]
+    cup, egg, everything = pose.table_rows(setting, results)
+    assert (cup.category, egg.category, everything.category) == ("cup", "egg", "all")
+    assert (egg.acc30, cup.acc30) == (100, pytest.approx(100 / 3))
+    assert everything.acc30 == pytest.approx(200 / 3)
+    assert (everything.pairs, everything.solve_ms, everything.memory_mb) == (4, 2, 3)
+    assert (cup.median_deg, everything.median_deg, everything.median_t) == (180, 90, np.inf)

@@ -1,0 +1,30 @@
+"""The speed table's arithmetic, and that it runs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from benchmarks import speed
+from core.errors import InvalidInput
+from core.pose import VARIANTS
+
+
+def test_medians_and_ratios() -> None:
+    times = [{"look": {"total": ms}, "solve": {"match": 1.0, "total": 5.0}} for ms in (1.0, 15.0, 100.0)]
+    rows = {(row.operation, row.stage): (row.ms, row.ratio) for row in speed.table_rows(times, ("look", "solve"))}
+    assert rows == {("look", "total"): (15, 0.75), ("solve", "match"): (1, 0.05), ("solve", "total"): (5, 0.25)}
+
+
+def test_every_stage_is_timed(recorded: Path, monkeypatch: pytest.MonkeyPatch, backbone) -> None:
+    monkeypatch.setattr(speed, "load_backbone", lambda name, device: backbone)
+    rows = speed.run(None, data=recorded, views=4, rounds=1)
+    totals = {row.operation for row in rows if row.stage == "total"}
+    assert {"encode", "learn", *(f"solve {variant}" for variant in VARIANTS)} <= totals
+    assert sum(row.ratio for row in rows if row.stage == "total" and row.operation in speed.OBSERVATION) == pytest.approx(1)
+
+
+def test_two_objects_with_enough_views_are_needed(recorded: Path) -> None:
+    with pytest.raises(InvalidInput, match="5 views"):
+        speed.run(None, data=recorded, views=5)

@@ -1,0 +1,67 @@
+"""The samples and the reader of their layout: conventions proven by reprojection."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from clients.datasets.folders import Sequence, find_sequences, load_burst
+from core.errors import InvalidInput
+
+
+def test_samples_are_enough_for_the_demo(samples: list[Sequence]) -> None:
+    instances = Counter(sequence.category for sequence in samples)
+    assert len(instances) >= 5
+    assert len(samples) >= 14
+    assert min(instances.values()) >= 2
+    assert min(len(sequence.images) for sequence in samples) >= 10
+
+
+def test_samples_are_small(samples: list[Sequence]) -> None:
+    root = samples[0].path.parents[1]
+    assert sum(file.stat().st_size for file in root.rglob("*") if file.is_file()) < 8_000_000
+
+
+def test_the_true_box_projects_around_the_silhouette(samples: list[Sequence]) -> None:
+    """K, extrinsics, model pose and the shrunk images agree: a wrong half pixel would not show, a wrong convention would."""
+    corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) / (2 * np.sqrt(3))
+    for sequence in samples:
+        view = load_burst(sequence, [0], masks=True).views[0]
+        assert view.mask is not None
+        assert view.camera is not None
+        assert sequence.world_from_model is not None
+        rows, columns = np.nonzero(view.mask)
+        center, depth = view.camera.project(sequence.world_from_model.translation)
+        assert columns.min() < center[0] < columns.max(), sequence.name
+        assert rows.min() < center[1] < rows.max(), sequence.name
+        cube, _ = view.camera.project(sequence.world_from_model.apply(corners))
+        assert np.ptp(cube, axis=0).max() > 0.5 * max(np.ptp(columns), np.ptp(rows)), sequence.name
+        assert view.depth_m is not None
+        measured = view.depth_m[view.mask & (view.depth_m > 0)]
+        assert abs(np.median(measured) - depth) < sequence.world_from_model.scale / 2, sequence.name
+
+
+def test_points_on_the_object_agree_between_views(samples: list[Sequence]) -> None:
+    """Depth under the silhouette, back-projected, lies inside the model's unit ball."""
+    for sequence in samples:
+        view = load_burst(sequence, [0], masks=True).views[0]
+        assert view.camera is not None
+        assert view.depth_m is not None
+        assert view.mask is not None
+        assert sequence.world_from_model is not None
+        rows, columns = np.nonzero(view.mask & (view.depth_m > 0))
+        points = view.camera.back_project(np.stack([columns, rows], axis=-1), view.depth_m[rows, columns])
+        distances = np.linalg.norm(sequence.world_from_model.inverse().apply(points), axis=1)
+        assert np.quantile(distances, 0.9) < 0.55, sequence.name
+
+
+def test_masks_are_given_only_when_asked_for(samples: list[Sequence]) -> None:
+    assert load_burst(samples[0], [0]).views[0].mask is None
+
+
+def test_a_folder_without_sequences_is_named(tmp_path: Path) -> None:
+    with pytest.raises(InvalidInput, match=r"sequence\.json"):
+        find_sequences(tmp_path)

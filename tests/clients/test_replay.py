@@ -1,0 +1,77 @@
+"""Recorded worlds and the choice of viewpoints."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from clients.datasets.folders import Sequence, load_burst
+from clients.datasets.viewpoints import aim_point, spread
+from clients.simulator.replay import ReplayWorld
+from core.scan import hemisphere
+from core.views import Camera
+
+K = np.array([[100.0, 0, 50], [0, 100, 50], [0, 0, 1]])
+CENTER_M = np.array([1.0, -2.0, 0.5])
+CAMERAS = [Camera(K, pose) for pose in hemisphere(CENTER_M, np.array([0.0, 0.6, 0.8]), 0.7, 12)]
+
+
+def test_cameras_aim_at_the_point_they_look_at() -> None:
+    np.testing.assert_allclose(aim_point(CAMERAS), CENTER_M, atol=1e-9)
+
+
+def test_spread_views_are_farther_apart_than_neighbours() -> None:
+    chosen = spread(CAMERAS, 4, first=3)
+    assert 3 in chosen
+    assert len(set(chosen)) == 4
+
+    def closest_deg(indices: list[int]) -> float:
+        towards = np.stack([CAMERAS[index].world_from_camera[:3, 2] for index in indices])
+        return float(np.degrees(np.arccos((towards @ towards.T)[np.triu_indices(len(indices), 1)].max())))
+
+    assert closest_deg(chosen) > 1.5 * closest_deg(list(range(12)))
+
+
+def test_spread_takes_all_where_there_are_no_more() -> None:
+    assert spread(CAMERAS[:3], 8) == [0, 1, 2]
+
+
+def test_a_recorded_pose_is_answered_exactly(samples: list[Sequence]) -> None:
+    world = ReplayWorld(samples[0])
+    recorded = load_burst(samples[0]).views[5]
+    assert recorded.camera is not None
+    view = world.capture(recorded.camera.world_from_camera)
+    np.testing.assert_array_equal(view.rgb, recorded.rgb)
+    assert world.offsets_deg == [pytest.approx(0, abs=1e-3)]
+
+
+def test_a_requested_pose_is_answered_by_the_nearest_and_says_how_far_off(samples: list[Sequence]) -> None:
+    world = ReplayWorld(samples[0])
+    cameras = load_burst(samples[0]).cameras
+    center = aim_point(cameras)
+    turned = np.eye(4)
+    axis = cameras[5].world_from_camera[:3, 1]
+    cross = np.cross(np.eye(3), axis)
+    angle = np.radians(2)
+    rotation = np.eye(3) + np.sin(angle) * cross.T + (1 - np.cos(angle)) * cross @ cross
+    turned[:3, :3] = rotation @ cameras[5].world_from_camera[:3, :3]
+    turned[:3, 3] = center + rotation @ (cameras[5].world_from_camera[:3, 3] - center)
+    view = world.capture(turned)
+    assert view.camera is not None
+    np.testing.assert_array_equal(view.camera.world_from_camera, cameras[5].world_from_camera)
+    assert world.offsets_deg[0] == pytest.approx(2, abs=0.2)
+
+
+def test_each_view_is_brought_once_before_any_again(samples: list[Sequence]) -> None:
+    world = ReplayWorld(samples[0])
+    cameras = load_burst(samples[0]).cameras
+    pose = cameras[0].world_from_camera
+    brought = [world.capture(pose) for _ in range(len(cameras) + 1)]
+    assert len({view.rgb.tobytes() for view in brought}) == len(cameras)
+    assert world.offsets_deg[-1] == pytest.approx(0, abs=1e-3)
+
+
+def test_a_glance_is_spread(samples: list[Sequence]) -> None:
+    world = ReplayWorld(samples[0])
+    assert len(world.glance(4)) == 4
+    assert len(world.glance()) == len(load_burst(samples[0]))

@@ -1,0 +1,115 @@
+"""The robot client: the whole loop against a service, and what it makes of problems."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import httpx
+import numpy as np
+import pytest
+
+from clients import errors
+from clients.datasets.folders import Sequence, load_burst
+from clients.robot import RobotClient
+from clients.simulator.replay import ReplayWorld
+
+
+def answering(handler: httpx.MockTransport) -> RobotClient:
+    return RobotClient(http=httpx.Client(transport=handler, base_url="http://robot.test"))
+
+
+def test_a_novel_object_is_scanned_learnt_and_recognised(robot: RobotClient, samples: list[Sequence]) -> None:
+    burst = load_burst(samples[0])
+    seen = robot.observe(burst)
+    assert seen.outcome == "novel"
+    assert seen.pose is None
+    assert seen.scan is not None
+    for view in burst.views:
+        seen.scan.add(view)
+    category = seen.scan.complete("car")
+    again = robot.observe(burst)
+    assert (again.outcome, again.category_id, again.name) == ("known", category.id, "car")
+    assert again.pose is not None
+    np.testing.assert_allclose(again.pose.matrix, np.eye(4), atol=1e-3)
+    assert again.pose.object_in_world.shape == (4, 4)
+    assert again.timings_ms["total"] > 0
+    assert again.similarities[0].similarity == pytest.approx(1)
+
+
+def test_a_scan_asks_for_camera_poses_that_a_world_answers(robot: RobotClient, samples: list[Sequence]) -> None:
+    world = ReplayWorld(samples[0])
+    scan = robot.scan(world.glance(3))
+    for viewpoint in scan:
+        scan.add(world.capture(viewpoint))
+    category = scan.complete()
+    assert category.views == len(scan) == 10
+    assert category.name is None
+
+
+def test_categories_are_listed_named_and_forgotten(robot: RobotClient, samples: list[Sequence]) -> None:
+    scan = robot.scan(load_burst(samples[0], range(2)))
+    for view in load_burst(samples[0], range(2)).views:
+        scan.add(view)
+    category = scan.complete()
+    assert robot.rename(category.id, "bug").name == "bug"
+    assert [each.name for each in robot.categories()] == ["bug"]
+    assert robot.info().categories == 1
+    robot.forget(category.id)
+    assert robot.categories() == []
+
+
+def test_pictures_are_png(robot: RobotClient, samples: list[Sequence]) -> None:
+    seen = robot.observe(load_burst(samples[0], range(2)))
+    assert robot.picture(f"/v1/observations/{seen.id}/foreground.png", view=1).startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(("name", "kind"), [(urn.removeprefix(errors.PROBLEM_URN), kind) for urn, kind in errors.PROBLEMS.items()])
+def test_every_problem_type_has_its_exception(name: str, kind: type[errors.ServiceProblem]) -> None:
+    problem = {"type": f"urn:onelook:problem:{name}", "title": "Title", "status": 422, "detail": "what to do", "field": "views[1].K"}
+    response = httpx.Response(422, json=problem, headers={"content-type": "application/problem+json"})
+    robot = answering(httpx.MockTransport(lambda request: response))
+    with pytest.raises(kind, match="^what to do$") as caught:
+        robot.categories()
+    assert type(caught.value) is kind
+    assert (caught.value.status, caught.value.field) == (422, "views[1].K")
+
+
+def test_the_service_names_problems_as_the_client_does() -> None:
+    from service.errors import KINDS
+
+    assert {f"{errors.PROBLEM_URN}{name}" for _, _, name, _ in KINDS} == set(errors.PROBLEMS)
+
+
+def test_a_wrong_field_of_a_real_burst_is_named(robot: RobotClient, samples: list[Sequence]) -> None:
+    with pytest.raises(errors.InvalidInputProblem, match="views_used"):
+        robot.observe(load_burst(samples[0], range(2)), views_used=3)
+    with pytest.raises(errors.NotFoundProblem):
+        robot.observe(load_burst(samples[0], range(2)), category_id="nobody")
+
+
+def test_another_server_is_told_from_the_service() -> None:
+    robot = answering(httpx.MockTransport(lambda request: httpx.Response(502, text="<html>Bad Gateway</html>")))
+    with pytest.raises(errors.ServiceProblem, match="502 Bad Gateway, which is no answer of this service"):
+        robot.info()
+
+
+@pytest.mark.parametrize(
+    ("failure", "kind", "words"),
+    [
+        (httpx.ConnectError("refused"), errors.Unreachable, "onelook serve"),
+        (httpx.ReadTimeout("late"), errors.TooSlow, "did not answer GET /v1/info in time"),
+        (httpx.RemoteProtocolError("cut off"), errors.Unreachable, "cut off"),
+    ],
+)
+def test_failures_on_the_way_say_what_to_do(failure: Exception, kind: type[errors.ClientError], words: str) -> None:
+    def fail(request: httpx.Request) -> httpx.Response:
+        raise failure
+
+    with pytest.raises(kind, match=words):
+        answering(httpx.MockTransport(fail)).info()
+
+
+def test_the_client_needs_neither_torch_nor_open3d() -> None:
+    check = "import sys, clients.robot; sys.exit(bool({'torch', 'open3d', 'fastapi', 'transformers'} & set(sys.modules)))"
+    assert subprocess.run([sys.executable, "-c", check]).returncode == 0

@@ -1,0 +1,86 @@
+"""The agent alone, without HTTP."""
+
+from __future__ import annotations
+
+import threading
+
+import numpy as np
+import pytest
+
+from core.errors import Conflict, InvalidInput, TooFewViews
+from service.agent import Agent, AgentConfig, ObserveOptions
+from store.memory import Memory
+
+CONFIG = AgentConfig("pooled_best_view", 0.7)
+
+
+@pytest.fixture
+def agent(tmp_path, backbone):
+    """An agent with an empty memory."""
+    with Memory.open(tmp_path / "memory") as memory:
+        yield Agent(backbone, memory, CONFIG)
+
+
+def test_look_scan_know(agent, look):
+    seen = agent.observe(look())
+    assert (seen.outcome, seen.pose) == ("novel", None)
+    agent.add_views(seen.scan_id, look())
+    category = agent.complete_scan(seen.scan_id, "ball")
+    again = agent.observe(look())
+    assert (again.outcome, again.category_id) == ("known", category.id)
+    assert np.allclose(again.pose.target_from_reference.as_matrix(), np.eye(4), atol=0.01)
+
+
+def test_an_answer_is_the_same_after_reopening(tmp_path, backbone, look):
+    with Memory.open(tmp_path / "memory") as memory:
+        agent = Agent(backbone, memory, CONFIG)
+        scan = agent.begin_scan(look())
+        agent.add_views(scan.id, look())
+        agent.complete_scan(scan.id)
+        before = agent.observe(look("bright", views=3))
+    with Memory.open(tmp_path / "memory") as memory:
+        after = Agent(backbone, memory, CONFIG).observe(look("bright", views=3))
+    assert after.decision.similarities == before.decision.similarities
+    assert np.array_equal(after.pose.target_from_reference.as_matrix(), before.pose.target_from_reference.as_matrix())
+
+
+def test_an_observation_s_tokens_are_kept_for_a_later_scan(agent, look):
+    seen = agent.observe(look())
+    kept = agent.encoded(seen.id)
+    fresh = agent._encoder.encode(look())
+    assert np.allclose(kept.views[3].descriptors, fresh.views[3].descriptors, atol=1e-3)
+    assert np.array_equal(kept.cloud_m, fresh.cloud_m)
+
+
+def test_an_unknown_variant_is_refused_before_anything_is_computed(agent, look):
+    with pytest.raises(InvalidInput, match="variant"):
+        agent.observe(look(), ObserveOptions(variant="best"))
+    assert agent.memory.observations.latest(1) == []
+
+
+def test_one_view_makes_no_category(agent, look):
+    scan = agent.begin_scan(look())
+    agent.add_views(scan.id, look().select([0]))
+    with pytest.raises(TooFewViews, match="send 1 more"):
+        agent.complete_scan(scan.id)
+
+
+def test_two_that_complete_one_scan_at_once_make_one_category(agent, look):
+    scan = agent.begin_scan(look())
+    agent.add_views(scan.id, look())
+    outcomes = []
+
+    def complete():
+        try:
+            outcomes.append(agent.complete_scan(scan.id).id)
+        except Conflict:
+            outcomes.append("conflict")
+
+    threads = [threading.Thread(target=complete) for _ in range(2)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    made = [category.id for category in agent.memory.categories.all()]
+    assert len(made) == 1
+    assert sorted(outcomes) == sorted([made[0], "conflict"])

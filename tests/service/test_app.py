@@ -1,0 +1,123 @@
+"""The application around the routes: start, probes, OpenAPI, and errors that nobody expected."""
+
+from __future__ import annotations
+
+import importlib.metadata
+
+import pytest
+from fastapi.testclient import TestClient
+
+from core.errors import Conflict, InvalidInput, OneLookError
+from service.app import create_app
+from service.errors import KINDS, problem_of
+from service.settings import Settings
+
+
+def test_probes(client):
+    assert client.get("/healthz").json() == client.get("/readyz").json() == {"status": "ok"}
+
+
+def test_info_tells_the_backbone_and_the_memory(client, learn):
+    before = client.get("/v1/info").json()
+    assert before["version"] == importlib.metadata.version("onelook")
+    assert (before["backbone"], before["fingerprint"], before["categories"]) == ("colour", "colour-1", 0)
+    learn()
+    after = client.get("/v1/info").json()
+    assert after["categories"] == 1
+    assert after["memory_version"] > before["memory_version"]
+
+
+def test_a_memory_of_another_backbone_is_refused_at_the_start(settings, backbone):
+    with TestClient(create_app(settings, backbone=backbone)):
+        pass
+
+    class Other(type(backbone)):
+        name, fingerprint = "other", "other-1"
+
+    with pytest.raises(Conflict, match=r"colour-1.*other-1"), TestClient(create_app(settings, backbone=Other())):
+        pass
+
+
+def test_an_unknown_score_is_refused_at_the_start(settings, backbone):
+    wrong = settings.model_copy(update={"score": "best"})
+    with pytest.raises(InvalidInput, match="'best' is none of"), TestClient(create_app(wrong, backbone=backbone)):
+        pass
+
+
+def test_settings_come_from_the_environment(monkeypatch):
+    monkeypatch.setenv("ONELOOK_PORT", "8123")
+    monkeypatch.setenv("ONELOOK_DATA_DIR", "/somewhere")
+    settings = Settings()
+    assert (settings.port, str(settings.data_dir)) == (8123, "/somewhere")
+
+
+def test_two_applications_live_side_by_side(settings, backbone, tmp_path, look, parts):
+    other = settings.model_copy(update={"data_dir": tmp_path / "other"})
+    with TestClient(create_app(settings, backbone=backbone)) as first, TestClient(create_app(other, backbone=backbone)) as second:
+        first.post("/v1/observations", files=parts(look()))
+        assert len(first.get("/v1/observations").json()["observations"]) == 1
+        assert second.get("/v1/observations").json()["observations"] == []
+
+
+def test_nothing_there_is_a_problem(client):
+    answer = client.get("/v1/nothing")
+    assert (answer.status_code, answer.headers["content-type"]) == (404, "application/problem+json")
+    assert "/docs" in answer.json()["detail"]
+
+
+def test_a_method_that_is_not_answered_is_a_problem(client):
+    answer = client.put("/v1/info")
+    assert (answer.status_code, answer.json()["title"]) == (405, "Method Not Allowed")
+    assert answer.headers["allow"] == "GET"
+
+
+def test_the_unexpected_is_a_problem_without_a_trace(settings, backbone, look, parts):
+    class Broken(type(backbone)):
+        def extract(self, images):
+            raise RuntimeError("secret detail")
+
+    with TestClient(create_app(settings, backbone=Broken()), raise_server_exceptions=False) as client:
+        answer = client.post("/v1/observations", files=parts(look()))
+    assert (answer.status_code, answer.headers["content-type"]) == (500, "application/problem+json")
+    assert "secret" not in answer.text
+    assert "Traceback" not in answer.text
+
+
+def test_every_kind_of_error_has_a_problem():
+    kinds = {kind for kind, *_ in KINDS}
+
+    def leaves(kind):
+        below = kind.__subclasses__()
+        return {kind} | {leaf for each in below for leaf in leaves(each)}
+
+    own = {kind for kind in leaves(OneLookError) if kind.__module__ == "core.errors"} - {OneLookError}
+    assert own == kinds
+
+
+def test_the_most_particular_kind_wins():
+    for kind, status, name, _ in KINDS:
+        error = kind("field", "message") if issubclass(kind, InvalidInput) else kind("message")
+        assert (problem_of(error).status, problem_of(error).type) == (status, f"urn:onelook:problem:{name}")
+
+
+def test_openapi_refers_only_to_what_it_has(client):
+    document = client.get("/openapi.json").json()
+    schemas = document["components"]["schemas"]
+
+    def references(node):
+        if isinstance(node, dict):
+            yield from [node["$ref"]] if isinstance(node.get("$ref"), str) else []
+            for each in node.values():
+                yield from references(each)
+        elif isinstance(node, list):
+            for each in node:
+                yield from references(each)
+
+    assert {reference.removeprefix("#/components/schemas/") for reference in references(document)} <= set(schemas)
+    assert "HTTPValidationError" not in schemas
+
+
+def test_operation_ids_are_the_routes_names(client):
+    document = client.get("/openapi.json").json()
+    ids = {operation["operationId"] for path in document["paths"].values() for operation in path.values()}
+    assert {"observe", "begin_scan", "complete_scan", "list_categories", "info"} <= ids

@@ -1,0 +1,151 @@
+"""The history of observations and the pictures behind it."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+
+
+@pytest.fixture
+def seen(client, look, parts, learn):
+    """An observation of a known object."""
+    learn()
+    return client.post("/v1/observations", files=parts(look("bright", views=4))).json()
+
+
+def picture(answer):
+    """The image of an answer, shape (H, W, 3), RGB."""
+    assert (answer.status_code, answer.headers["content-type"]) == (200, "image/png"), answer.text
+    return cv2.imdecode(np.frombuffer(answer.content, np.uint8), cv2.IMREAD_COLOR)[..., ::-1]
+
+
+def test_an_observation_is_answered_again(client, seen):
+    assert client.get(f"/v1/observations/{seen['id']}").json() == seen
+
+
+def test_the_latest_come_first_and_no_more_than_asked(client, seen):
+    listed = client.get("/v1/observations").json()["observations"]
+    assert listed[0] == seen
+    assert len(listed) == 2
+    assert client.get("/v1/observations?limit=1").json()["observations"] == [seen]
+
+
+def test_timings_name_every_stage_within_the_total(seen):
+    timings = dict(seen["timings_ms"])
+    total = timings.pop("total")
+    assert {"find", "features", "points", "decide", "load", "match", "views", "solve"} <= set(timings)
+    assert 0 < sum(timings.values()) <= total * 1.001
+
+
+def test_the_frame_s_name_comes_back(client, look, parts):
+    answer = client.post("/v1/observations", files=parts(look(), lambda about, files: about.update(frame="table")))
+    assert answer.json()["frame"] == "table"
+
+
+def test_debug_is_there_only_when_asked_for(client, seen):
+    assert seen["debug"] is None
+    debug = client.get(f"/v1/observations/{seen['id']}?include=debug").json()["debug"]
+    assert np.array(debug["view_similarity"]).shape == (6, 4)
+    assert all(0 <= reference < 6 and 0 <= target < 4 for reference, target in debug["pairs"])
+
+
+def test_a_named_category_skips_the_decision(client, look, parts, learn):
+    category = learn("bright")
+    answer = client.post("/v1/observations", files=parts(look("dark")), params={"category_id": category["id"]}).json()
+    assert (answer["outcome"], answer["category_id"]) == ("known", category["id"])
+    assert (answer["score"], answer["threshold"], answer["similarities"]) == (None, None, [])
+
+
+def test_a_higher_threshold_makes_it_novel(client, look, parts, learn):
+    learn()
+    answer = client.post("/v1/observations", files=parts(look()), params={"threshold": 1.5}).json()
+    assert (answer["outcome"], answer["threshold"]) == ("novel", 1.5)
+
+
+def test_only_the_first_views_are_used(client, look, parts):
+    answer = client.post("/v1/observations", files=parts(look()), params={"views_used": 2}).json()
+    assert answer["views"] == 2
+
+
+def test_learning_is_only_on_request(client, look, parts, learn):
+    category = learn()
+
+    def instances_after(**params):
+        client.post("/v1/observations", files=parts(look()), params=params)
+        return client.get(f"/v1/categories/{category['id']}").json()["instances"]
+
+    assert [instances_after(), instances_after(learn=True)] == [1, 2]
+
+
+def test_a_view_comes_back_as_it_was_sent(client, look, seen):
+    assert np.array_equal(picture(client.get(f"/v1/observations/{seen['id']}/rgb.png?view=3")), look("bright", views=4).views[3].rgb)
+
+
+def test_the_overlay_draws_a_box_around_the_object(client, look, seen):
+    view = look("bright", views=4).views[1]
+    shown = picture(client.get(f"/v1/observations/{seen['id']}/overlay.png?view=1")).astype(int)
+    assert shown.shape == view.rgb.shape
+    drawn = (np.abs(shown - [255, 200, 0]) < 60).all(axis=2) & ~(view.depth_m > 0)
+    rows, columns = np.nonzero(drawn)
+    object_rows, object_columns = np.nonzero(view.depth_m > 0)
+    assert drawn.sum() > 50
+    assert abs(rows.mean() - object_rows.mean()) < 15
+    assert abs(columns.mean() - object_columns.mean()) < 15
+
+
+def test_correspondences_join_two_crops(client, seen):
+    shown = picture(client.get(f"/v1/observations/{seen['id']}/correspondences.png")).astype(int)
+    assert shown.shape == (448, 2 * 448 + 16, 3)
+    gap = shown[:, 448:464]
+    assert (gap.min(axis=2) < 200).any()
+
+
+def test_correspondences_of_a_view_that_the_pose_does_not_rest_on(client, seen):
+    answer = client.get(f"/v1/observations/{seen['id']}/correspondences.png?view=99")
+    assert answer.status_code == 404
+    assert "rests on the views" in answer.json()["detail"]
+
+
+def test_foreground_and_components_of_a_view(client, seen):
+    for name in ("foreground", "pca"):
+        assert picture(client.get(f"/v1/observations/{seen['id']}/{name}.png?view=2")).shape == (448, 448, 3)
+
+
+def test_a_novel_object_has_components_before_and_after_its_scan(client, look, parts):
+    novel = client.post("/v1/observations", files=parts(look())).json()
+    path = f"/v1/observations/{novel['id']}/pca.png"
+    own = picture(client.get(path))
+    client.post(f"/v1/scans/{novel['scan']['id']}/views", files=parts(look()))
+    client.post(f"/v1/scans/{novel['scan']['id']}/complete")
+    assert picture(client.get(path)).shape == own.shape
+
+
+@pytest.mark.parametrize("name", ["overlay", "correspondences"])
+def test_without_a_pose_there_is_nothing_to_draw(client, look, parts, name):
+    novel = client.post("/v1/observations", files=parts(look())).json()
+    answer = client.get(f"/v1/observations/{novel['id']}/{name}.png")
+    assert answer.status_code == 404
+    assert "pose" in answer.json()["detail"]
+
+
+def test_a_deleted_category_leaves_the_history(client, seen):
+    client.delete(f"/v1/categories/{seen['category_id']}")
+    now = client.get(f"/v1/observations/{seen['id']}").json()
+    assert (now["outcome"], now["category_id"], now["name"]) == ("known", None, None)
+    assert client.get(f"/v1/observations/{seen['id']}/correspondences.png").status_code == 404
+    assert client.get(f"/v1/observations/{seen['id']}/overlay.png").status_code == 200
+
+
+@pytest.mark.parametrize("path", ["", "/rgb.png", "/pca.png", "/foreground.png", "/overlay.png", "/correspondences.png"])
+def test_an_unknown_observation(client, path):
+    answer = client.get(f"/v1/observations/nope{path}")
+    assert answer.status_code == 404
+    assert "no observation has the id 'nope'" in answer.json()["detail"]
+
+
+def test_a_view_it_does_not_have(client, seen):
+    for name in ("rgb", "pca", "foreground", "overlay"):
+        answer = client.get(f"/v1/observations/{seen['id']}/{name}.png?view=4")
+        assert answer.status_code == 404
+        assert "views 0 to 3" in answer.json()["detail"]

@@ -1,0 +1,75 @@
+"""Scans keep what they asked for and what came, and end in a category."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from core.encode import EncodedBurst
+from core.errors import Conflict, NotFound
+from core.reference import Reference
+from core.scan import ScanRequest
+from core.views import Burst
+from store.memory import Memory
+
+
+def test_a_scan_keeps_its_request(memory: Memory, request_for_views: ScanRequest) -> None:
+    scan = memory.scans.create(request_for_views)
+    assert (scan.state, scan.views) == ("requested", 0)
+    assert np.array_equal(scan.request.world_from_camera, request_for_views.world_from_camera)
+    assert scan.request.radius_m == request_for_views.radius_m
+
+
+def test_views_add_up_in_order(memory: Memory, request_for_views: ScanRequest, burst: Burst) -> None:
+    scan = memory.scans.create(request_for_views)
+    memory.scans.add(scan.id, burst.select([2]))
+    assert memory.scans.add(scan.id, burst.select([0, 1])).views == 3
+    found = memory.scans.burst(scan.id)
+    assert [np.array_equal(view.rgb, burst.views[index].rgb) for view, index in zip(found.views, (2, 0, 1))] == [True] * 3
+
+
+def test_a_scan_without_views_has_no_burst(memory: Memory, request_for_views: ScanRequest) -> None:
+    assert memory.scans.burst(memory.scans.create(request_for_views).id) is None
+
+
+def test_a_scan_outlives_the_process(folder: Path, request_for_views: ScanRequest, burst: Burst) -> None:
+    with Memory.open(folder) as memory:
+        scan = memory.scans.create(request_for_views)
+        memory.scans.add(scan.id, burst)
+    with Memory.open(folder) as memory:
+        assert memory.scans.get(scan.id).state == "collecting"
+        assert len(memory.scans.burst(scan.id)) == len(burst)
+
+
+def test_completing_makes_one_category_and_frees_the_views(
+    memory: Memory, request_for_views: ScanRequest, reference: Reference, burst: Burst, encoded: EncodedBurst
+) -> None:
+    scan = memory.scans.create(request_for_views)
+    memory.scans.add(scan.id, burst)
+    category = memory.categories.create(reference, burst, encoded, scan_id=scan.id)
+    done = memory.scans.get(scan.id)
+    assert (done.state, done.category_id, done.views) == ("completed", category.id, 0)
+    assert not memory.scans.folder(scan.id).exists()
+    with pytest.raises(Conflict):
+        memory.categories.create(reference, burst, encoded, scan_id=scan.id)
+    assert len(memory.categories.all()) == 1
+
+
+def test_a_completed_scan_takes_no_more_views(
+    memory: Memory, request_for_views: ScanRequest, reference: Reference, burst: Burst, encoded: EncodedBurst
+) -> None:
+    scan = memory.scans.create(request_for_views)
+    memory.categories.create(reference, burst, encoded, scan_id=scan.id)
+    with pytest.raises(Conflict, match="completed"):
+        memory.scans.add(scan.id, burst)
+
+
+def test_deleting_forgets_rows_and_views(memory: Memory, request_for_views: ScanRequest, burst: Burst) -> None:
+    scan = memory.scans.create(request_for_views)
+    memory.scans.add(scan.id, burst)
+    memory.scans.delete(scan.id)
+    assert not memory.scans.folder(scan.id).exists()
+    with pytest.raises(NotFound):
+        memory.scans.get(scan.id)
