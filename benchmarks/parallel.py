@@ -9,6 +9,7 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
 from typing import TypeVar
 
+from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 Job = TypeVar("Job")
@@ -19,9 +20,10 @@ THREAD_SETTINGS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 def bar(disable: bool = False) -> Progress:
-    """The progress bar of every benchmark; it leaves no trace."""
+    """The progress bar of every benchmark, on a terminal only; it leaves no trace."""
+    console = Console(stderr=True)
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    return Progress(*columns, transient=True, disable=disable)
+    return Progress(*columns, console=console, transient=True, disable=disable or not console.is_terminal)
 
 
 def worker_count(jobs: int) -> int:

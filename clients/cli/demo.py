@@ -28,7 +28,7 @@ def simulate(
     data: Annotated[Path | None, typer.Option(help="Folder of recorded objects; the samples of the repository where left out.")] = None,
     out: Annotated[Path, typer.Option(help="Folder for report.html and episode.json.")] = Path("out/demo"),
     seed: Annotated[int, typer.Option(help="Of the order of the objects and of the views of each.")] = 0,
-    views: Annotated[int, typer.Option(min=2, help="Views in the burst of each encounter.")] = 6,
+    views: Annotated[int, typer.Option(min=2, help="Views in the burst of each encounter.")] = 8,
     world: Annotated[WorldKind, typer.Option(help="What the robot looks at: recorded views.")] = WorldKind.replay,
     url: Annotated[str | None, typer.Option(help="A service with an empty memory; one is started and stopped where left out.")] = None,
 ) -> None:

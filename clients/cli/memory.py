@@ -12,9 +12,16 @@ from clients.cli.terminal import URL, Json, Url, console, print_facts, print_jso
 from clients.errors import ClientError
 from clients.robot import RobotClient
 
-app = typer.Typer(help="List, rename or forget the categories of the memory.", no_args_is_help=True)
+app = typer.Typer(help="List, rename or forget the categories of the memory.")
 
 Which = Annotated[str, typer.Argument(help="The category's name, its id, or the id's first characters.")]
+
+
+@app.callback(invoke_without_command=True)
+def categories(context: typer.Context, url: Url = URL, json: Json = False) -> None:
+    """List the categories of the memory, or rename or forget one."""
+    if context.invoked_subcommand is None:
+        list_categories(url, json)
 
 
 @app.command("list")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated
@@ -13,7 +14,9 @@ from rich.table import Table
 
 from clients.robot import DEFAULT_URL
 
-console = Console()
+LOG_WIDTH = 120
+"""Characters a line where the output is no terminal: nothing says how wide a file is."""
+console = Console(width=None if sys.stdout.isatty() else LOG_WIDTH)
 errors = Console(stderr=True)
 
 Url = Annotated[str, typer.Option(help="Address of the service.", envvar="ONELOOK_URL")]

@@ -1,0 +1,1 @@
+"""A simulated robot: worlds, episodes and their reports."""

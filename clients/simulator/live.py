@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from contextlib import nullcontext
+from collections.abc import Iterable, Sequence
 
 from rich.console import Console
-from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
@@ -15,6 +13,8 @@ from clients.simulator.episode import ACC_DEG, Encounter, Summary, Verdict
 STAGES = {"find": "find", "features": "features", "points": "features", "decide": "decide"}
 """The service's stages, by the column they are added up in; all others are part of the pose."""
 COLUMNS = ("find", "features", "decide", "pose")
+WIDE = 120
+"""Characters a line from which there is room for every stage."""
 STYLES = {
     Verdict.NEW: "cyan",
     Verdict.RECOGNISED: "green",
@@ -25,19 +25,21 @@ STYLES = {
 
 
 def show(encounters: Iterable[Encounter], total: int, console: Console) -> list[Encounter]:
-    """Runs through the encounters with a table that grows; returns them."""
-    table = _table()
+    """Runs through the encounters, a row for each as it is over; returns them.
+
+    Rows are printed and not redrawn, so that a long episode scrolls and a log file gets the same table.
+    """
+    stages = COLUMNS if console.width >= WIDE else ("total",)
+    console.print(_row(stages, header=True))
     done: list[Encounter] = []
-    with Live(table, console=console, refresh_per_second=4) if console.is_terminal else nullcontext() as live:
+    with console.status(f"1 of {total}") as status:
         for encounter in encounters:
             done.append(encounter)
-            table.add_row(*_cells(encounter))
-            if live is None:
-                console.print(f"{encounter.number}/{total} {encounter.sequence.name}: {_decision(encounter).plain}")
-            else:
-                table.caption = f"{len(done)} of {total} objects"
-    if not console.is_terminal:
-        console.print(table)
+            console.print(_row(stages, encounter))
+            if encounter.failure:
+                console.print(Text(f"    {encounter.failure}", style="red"))
+            status.update(f"{min(len(done) + 1, total)} of {total}")
+    console.print()
     return done
 
 
@@ -75,31 +77,35 @@ def summary_rows(summary: Summary) -> list[tuple[str, str, str]]:
 
 
 def stage_ms(encounter: Encounter) -> dict[str, float]:
-    """The service's milliseconds, added up in COLUMNS."""
-    added = dict.fromkeys(COLUMNS, 0.0)
+    """The service's milliseconds, added up in those of COLUMNS that took place."""
+    added: dict[str, float] = {}
     for stage, milliseconds in encounter.observation.timings_ms.items():
         if stage != "total":
-            added[STAGES.get(stage, "pose")] += milliseconds
+            column = STAGES.get(stage, "pose")
+            added[column] = added.get(column, 0.0) + milliseconds
     return added
 
 
-def _table() -> Table:
-    table = Table(title="Encounters", title_justify="left", caption_justify="left", header_style="dim", pad_edge=False)
-    table.add_column("#", justify="right")
-    table.add_column("object")
-    table.add_column("decision")
-    table.add_column("similarity", justify="right")
-    table.add_column("rotation\nerror", justify="right")
-    for stage in COLUMNS:
-        table.add_column(f"{stage}\nms", justify="right", style="dim")
-    table.add_column("scan\ns", justify="right", style="dim")
+def _row(stages: Sequence[str], encounter: Encounter | None = None, *, header: bool = False) -> Table:
+    """A table of one row, or of the headings; all have the same widths."""
+    table = Table(box=None, show_header=header, pad_edge=False, padding=(0, 1, 0, 0), header_style="dim")
+    table.add_column("#", justify="right", width=3)
+    for heading, width in (("object", 22), ("decision", 22)):
+        table.add_column(heading, width=width, no_wrap=True)
+    table.add_column("similarity", justify="right", width=13)
+    table.add_column("rotation", justify="right", width=8)
+    for stage in stages:
+        table.add_column(f"{stage} ms", justify="right", width=max(7, len(stage) + 3), style="dim")
+    table.add_column("scan s", justify="right", width=6, style="dim")
+    if encounter is not None:
+        table.add_row(*_cells(encounter, stages))
     return table
 
 
-def _cells(encounter: Encounter) -> list[Text | str]:
-    stages = stage_ms(encounter)
+def _cells(encounter: Encounter, stages: Sequence[str]) -> list[Text | str]:
+    spent = {**stage_ms(encounter), "total": encounter.observation.timings_ms["total"]}
+    times = [f"{spent[stage]:.0f}" if stage in spent else "" for stage in stages]
     scan = "" if encounter.scan_ms is None else f"{encounter.scan_ms / 1e3:.1f}"
-    times = [f"{stages[column]:.0f}" if stages[column] else "" for column in COLUMNS]
     return [str(encounter.number), encounter.sequence.name, _decision(encounter), similarity(encounter), _rotation(encounter), *times, scan]
 
 
@@ -107,14 +113,11 @@ def _decision(encounter: Encounter) -> Text:
     words = {
         Verdict.NEW: "novel → learnt",
         Verdict.RECOGNISED: f"known → {encounter.kind}",
-        Verdict.FALSE_NOVEL: "FALSE NOVEL → learnt again",
+        Verdict.FALSE_NOVEL: "FALSE NOVEL",
         Verdict.FALSE_KNOWN: f"FALSE KNOWN → {encounter.kind}",
         Verdict.UNDECIDED: "uncertain",
     }
-    text = Text(words[encounter.verdict], style=STYLES[encounter.verdict])
-    if encounter.failure:
-        text.append(f"\n{encounter.failure}", style="red")
-    return text
+    return Text(words[encounter.verdict], style=STYLES[encounter.verdict])
 
 
 def similarity(encounter: Encounter) -> str:

@@ -25,7 +25,7 @@ CROP_SIDE = 320
 
 @dataclass(frozen=True)
 class Pictures:
-    """Data URIs of one encounter's pictures, all of one view; None where there is none."""
+    """Data URIs of one encounter's pictures; None where there is none."""
 
     view: int
     """Index in the burst."""
@@ -34,27 +34,28 @@ class Pictures:
     pca: str | None
     overlay: str | None
     correspondences: str | None
+    """In the view where most agree with the pose; the other pictures are of `view`."""
     scanned: str | None
     """The views that a category was learnt from."""
 
 
 def fetch_pictures(robot: RobotClient, encounter: Encounter) -> Pictures:
-    """All pictures that the service has of an encounter, of the view that `shown_view` names."""
+    """All pictures that the service has of an encounter."""
     view = shown_view(encounter)
 
-    def fetch(name: str, side: int | None = CROP_SIDE) -> str | None:
+    def fetch(name: str, side: int | None = None, **which: int) -> str | None:
         try:
-            return data_uri(robot.picture(f"/v1/observations/{encounter.observation.id}/{name}.png", view=view), side)
+            return data_uri(robot.picture(f"/v1/observations/{encounter.observation.id}/{name}.png", **which), side)
         except NotFoundProblem:
             return None
 
     return Pictures(
         view=view,
-        rgb=fetch("rgb"),
-        foreground=fetch("foreground"),
-        pca=fetch("pca"),
-        overlay=fetch("overlay"),
-        correspondences=fetch("correspondences", None),
+        rgb=fetch("rgb", CROP_SIDE, view=view),
+        foreground=fetch("foreground", CROP_SIDE, view=view),
+        pca=fetch("pca", CROP_SIDE, view=view),
+        overlay=fetch("overlay", CROP_SIDE, view=view),
+        correspondences=fetch("correspondences"),
         scanned=_scanned(robot, encounter),
     )
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from operator import neg, truediv
+from operator import neg
 
 import pytest
 
@@ -33,8 +33,7 @@ def test_one_job_needs_no_process() -> None:
 def test_threads_are_limited_only_for_children(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(THREAD_SETTINGS[0], "5")
     monkeypatch.delenv(THREAD_SETTINGS[1], raising=False)
-    with pytest.raises(ZeroDivisionError), single_threaded_children():
+    with single_threaded_children():
         assert {os.environ[name] for name in THREAD_SETTINGS} == {"1"}
-        truediv(1, 0)
     assert os.environ[THREAD_SETTINGS[0]] == "5"
     assert THREAD_SETTINGS[1] not in os.environ

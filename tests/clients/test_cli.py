@@ -36,7 +36,7 @@ def test_an_object_is_taught_named_recognised_and_forgotten(url: str, samples: l
     assert "learnt bug" in taught.output
     listed = json.loads(onelook("categories", "list", "--json", "--url", url).output)
     assert [each["name"] for each in listed] == ["bug"]
-    assert "bug" in onelook("categories", "list", "--url", url).output
+    assert "bug" in onelook("categories", "--url", url).output
     seen = json.loads(onelook("observe", folder, "--json", "--url", url).output)
     assert (seen["outcome"], seen["name"]) == ("known", "bug")
     assert "correspondences" in onelook("observe", folder, "--category", "bug", "--url", url).output
