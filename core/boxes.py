@@ -56,10 +56,15 @@ The appendix uses a fixed distance (5e-5 m), which depends on resolution; this d
 
 def remove_outliers(points: FloatArray) -> FloatArray:
     """Points, shape (N, 3), without those far from their ten nearest neighbours."""
+    return points[inliers(points)]
+
+
+def inliers(points: FloatArray) -> NDArray[np.intp]:
+    """Indices of the points, shape (N, 3), that `remove_outliers` keeps."""
     if len(points) <= NEIGHBOURS:
-        return points
+        return np.arange(len(points))
     _, kept = _cloud(points).remove_statistical_outlier(nb_neighbors=NEIGHBOURS, std_ratio=OUTLIER_DEVIATIONS)
-    return points[np.asarray(kept, dtype=int)]
+    return np.asarray(kept, dtype=np.intp)
 
 
 def oriented_box(points: FloatArray) -> OrientedBox:

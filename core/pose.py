@@ -1,6 +1,6 @@
 """The pose pipeline: descriptors of a reference and a burst in, a 7-D transform out; every variant is a config.
 
-Letters: M reference views, N target views, K correspondences.
+Letters: M reference views, N target views, K correspondences, T transforms.
 """
 
 from __future__ import annotations
@@ -9,19 +9,37 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from core.boxes import cloud_extent_m
 from core.clock import StageClock
 from core.correspond import METHODS, PairMatches, PatchSet, match
+from core.dense import DenseAgreement, DenseConfig
 from core.descriptors import unit
 from core.encode import EncodedBurst, EncodedView
-from core.errors import InvalidInput
-from core.estimators.base import FloatArray, RobustFit
+from core.errors import InvalidInput, NoPose
 from core.estimators.ransac import ransac
+from core.hypotheses import HypothesesConfig, distinct, propose
+from core.matches import Alternative, Matches, PoseEstimate, among_all_patches, end_points, pool
 from core.reference import Reference
 from core.sim3 import Sim3
 from core.viewpoints import best_reference_per_target, consensus, relative_rotations
+from core.views import FloatArray
+
+Pairs = list[tuple[int, int]]
+
+
+@dataclass(frozen=True)
+class BestConfig:
+    """What the variant `best` adds: many hypotheses, judged and refined over all points."""
+
+    hypotheses: HypothesesConfig = field(default_factory=HypothesesConfig)
+    dense: DenseConfig = field(default_factory=DenseConfig)
+    refined: int = 12
+    """Hypotheses that are refined: the best of those that differ in rotation."""
+    distinct_deg: float = 12.0
+    alternative_deg: float = 30.0
+    """An alternative differs by at least this from better ones."""
+    alternatives: int = 3
 
 
 @dataclass(frozen=True)
@@ -39,6 +57,8 @@ class PoseConfig:
     """θ of the consensus; None leaves it out (variants without C)."""
     inlier_ratio: float = 0.08
     """Inlier threshold as a share of the target's extent."""
+    best: BestConfig | None = None
+    """Judge many hypotheses densely instead of taking the first consensus."""
 
     def __post_init__(self) -> None:
         if self.method not in METHODS:
@@ -46,7 +66,7 @@ class PoseConfig:
 
     @staticmethod
     def named(variant: str) -> PoseConfig:
-        """The config of a variant of the paper's table 1. Raises InvalidInput for an unknown name."""
+        """The config of a variant. Raises InvalidInput for an unknown name."""
         if variant not in VARIANTS:
             raise InvalidInput("variant", f"{variant!r} is none of {', '.join(VARIANTS)}")
         return VARIANTS[variant]
@@ -54,60 +74,13 @@ class PoseConfig:
 
 _UCD = PoseConfig()
 VARIANTS = {
+    "best": replace(_UCD, variant="best", best=BestConfig()),
     "ucd": _UCD,
     "ud": replace(_UCD, variant="ud", consensus_deg=None),
     "uc": replace(_UCD, variant="uc", dims=None),
     "u": replace(_UCD, variant="u", dims=None, consensus_deg=None),
 }
-"""R: retrieval, C: consensus, U: Umeyama, D: reduced descriptors."""
-
-
-@dataclass(frozen=True, eq=False)
-class Matches:
-    """Correspondences that the transform was fitted to."""
-
-    reference_view: NDArray[np.intp]
-    """Shape (K,)."""
-    reference_patch: NDArray[np.intp]
-    """Index into that view's `cells`, shape (K,)."""
-    target_view: NDArray[np.intp]
-    target_patch: NDArray[np.intp]
-    similarity: FloatArray
-    """Cosine, shape (K,)."""
-    inlier: NDArray[np.bool_]
-
-    def __len__(self) -> int:
-        return len(self.similarity)
-
-
-@dataclass(frozen=True, eq=False)
-class Alternative:
-    """Another pose that explains the views nearly as well."""
-
-    target_from_reference: Sim3
-    score: float
-
-
-@dataclass(frozen=True, eq=False)
-class PoseEstimate:
-    """A target's pose and what it rests on."""
-
-    target_from_reference: Sim3
-    matches: Matches
-    view_similarity: FloatArray
-    """S, shape (M, N)."""
-    pairs: tuple[tuple[int, int], ...]
-    """(reference view, target view) pairs whose correspondences were used."""
-    residual_m: float
-    confidence: float | None = None
-    """Probability that the rotation is within 30°, where the variant estimates one."""
-    alternatives: tuple[Alternative, ...] = ()
-    stage_ms: dict[str, float] = field(default_factory=dict)
-
-    @property
-    def inliers(self) -> int:
-        """Correspondences that agree with the transform."""
-        return int(self.matches.inlier.sum())
+"""`best` is ours; of the paper's letters (table 1), U is Umeyama, C consensus, D reduced descriptors."""
 
 
 class PoseEstimator:
@@ -123,72 +96,99 @@ class PoseEstimator:
         """
         require_comparable(reference, target)
         clock = StageClock()
-        reference_views = [view.trusted_only() for view in reference.views]
-        target_views = [view.trusted_only() for view in target.views]
-        found = match(self._patches(reference, reference_views), self._patches(reference, target_views), self.config.correspondences, self.config.method)
-        similarity = found.view_similarity().numpy()
+        pair = _Pair(reference, target, self.config)
         clock.lap("match")
-        pairs = self._choose_pairs(similarity, reference_views, target_views, seed)
+        threshold_m = self.config.inlier_ratio * cloud_extent_m(target.cloud_m)
+        if self.config.best is None:
+            estimate = self._by_consensus(pair, threshold_m, seed, clock)
+        else:
+            estimate = self._by_agreement(pair, self.config.best, threshold_m, seed, clock)
+        return replace(estimate, matches=among_all_patches(estimate.matches, reference.views, target.views), stage_ms=clock.stage_ms)
+
+    def _by_consensus(self, pair: _Pair, threshold_m: float, seed: int, clock: StageClock) -> PoseEstimate:
+        """The paper's pipeline: best view pairs, consensus, RANSAC ("Viewpoint estimation", "Final pose estimation")."""
+        pairs = pair.best_pairs()
+        if self.config.consensus_deg is not None and pairs:
+            rotations = relative_rotations(pair.reference, pair.target)
+            agree = consensus(np.stack([rotations[each] for each in pairs]), self.config.consensus_deg, seed)
+            pairs = [each for each, kept in zip(pairs, agree) if kept]
         clock.lap("views")
-        chosen = _pool(found, pairs)
-        source, aim = _points(reference_views, chosen.reference_view, chosen.reference_patch), _points(target_views, chosen.target_view, chosen.target_patch)
-        fit = ransac(source, aim, self.config.inlier_ratio * cloud_extent_m(target.cloud_m), seed)
+        matches = pool(pair.found, pairs)
+        fit = ransac(*end_points(matches, pair.reference, pair.target), threshold_m, seed)
         clock.lap("solve")
-        matches = _to_all_patches(replace(chosen, inlier=fit.inlier), reference.views, target.views)
-        return PoseEstimate(fit.target_from_reference, matches, similarity, tuple(pairs), fit.residual_m, stage_ms=clock.stage_ms)
+        return PoseEstimate(
+            fit.target_from_reference, replace(matches, inlier=fit.inlier), pair.similarity, tuple(pairs), residual_m=fit.residual_m
+        )
 
-    def _patches(self, reference: Reference, views: Sequence[EncodedView]) -> PatchSet:
-        dims = self.config.dims
-        tokens = [view.descriptors if dims is None else reference.basis.project(view.descriptors, dims) for view in views]
-        places = [view.points_m if self.config.method == "cyclical-3d" else view.cells.astype(np.float32) for view in views]
-        return PatchSet.pad([unit(each) for each in tokens], places)
+    def _by_agreement(self, pair: _Pair, config: BestConfig, threshold_m: float, seed: int, clock: StageClock) -> PoseEstimate:
+        """Ours: many hypotheses, the most promising refined, the one that lays the objects on each other best."""
+        guesses = propose(pair.found, pair.similarity, pair.reference, pair.target, config.hypotheses, threshold_m, seed)
+        if not len(guesses):
+            raise NoPose("no view pair gives a hypothesis of plausible size; send more views or better depth")
+        clock.lap("propose")
+        agreement = DenseAgreement(pair.reference, pair.target, pair.descriptors, config.dense, seed)
+        promising = distinct(guesses, agreement.score(guesses), config.distinct_deg, config.refined)
+        clock.lap("score")
+        refined = agreement.refine(guesses.select(promising))
+        scores = agreement.score(refined)
+        ranked = distinct(refined, scores, config.alternative_deg, 1 + config.alternatives)
+        clock.lap("refine")
+        pairs = pair.best_pairs()
+        matches, residual_m = _judge(pool(pair.found, pairs), refined[ranked[0]], pair, threshold_m)
+        alternatives = tuple(Alternative(refined[index], float(scores[index])) for index in ranked[1:])
+        return PoseEstimate(
+            refined[ranked[0]],
+            matches,
+            pair.similarity,
+            tuple(pairs),
+            residual_m,
+            score=float(scores[ranked[0]]),
+            alternatives=alternatives,
+        )
 
-    def _choose_pairs(
-        self, similarity: FloatArray, reference: Sequence[EncodedView], target: Sequence[EncodedView], seed: int
-    ) -> list[tuple[int, int]]:
-        pairs = [pair for pair in best_reference_per_target(similarity) if similarity[pair] > 0]
-        if self.config.consensus_deg is None or not pairs:
-            return pairs
-        rotations = relative_rotations(reference, target)
-        agree = consensus(np.stack([rotations[pair] for pair in pairs]), self.config.consensus_deg, seed)
-        return [pair for pair, kept in zip(pairs, agree) if kept]
+
+class _Pair:
+    """A reference and a target, trusted patches only, described in one basis and matched."""
+
+    def __init__(self, reference: Reference, target: EncodedBurst, config: PoseConfig) -> None:
+        self.reference = [view.trusted_only() for view in reference.views]
+        self.target = [view.trusted_only() for view in target.views]
+        self.descriptors = _describe(self.reference, reference, config.dims), _describe(self.target, reference, config.dims)
+        sides = [self._patches(views, vectors, config) for views, vectors in zip((self.reference, self.target), self.descriptors)]
+        self.found: PairMatches = match(sides[0], sides[1], config.correspondences, config.method)
+        self.similarity: FloatArray = self.found.view_similarity().numpy()
+
+    @staticmethod
+    def _patches(views: Sequence[EncodedView], vectors: Sequence[FloatArray], config: PoseConfig) -> PatchSet:
+        places = [view.points_m if config.method == "cyclical-3d" else view.cells.astype(np.float32) for view in views]
+        return PatchSet.pad(vectors, places)
+
+    def best_pairs(self) -> Pairs:
+        """Every target view with its most similar reference view, where anything matched."""
+        return [each for each in best_reference_per_target(self.similarity) if self.similarity[each] > 0]
+
+
+def _describe(views: Sequence[EncodedView], reference: Reference, dims: int | None) -> list[FloatArray]:
+    """Unit descriptors of each view's patches, along the reference's first `dims` components."""
+    return [unit(view.descriptors if dims is None else reference.basis.project(view.descriptors, dims)) for view in views]
+
+
+def _judge(matches: Matches, transform: Sim3, pair: _Pair, threshold_m: float) -> tuple[Matches, float]:
+    """Correspondences marked as inliers of a transform, and the inliers' residual."""
+    source, aim = end_points(matches, pair.reference, pair.target)
+    errors = np.linalg.norm(transform.apply(source) - aim, axis=1)
+    inlier = errors < threshold_m
+    return replace(matches, inlier=inlier), float(np.sqrt((errors[inlier] ** 2).mean())) if inlier.any() else 0.0
 
 
 def require_comparable(reference: Reference, target: EncodedBurst) -> None:
     """Raises InvalidInput where descriptors, cameras or depth do not allow a 7-D pose."""
     if reference.fingerprint != target.fingerprint:
-        raise InvalidInput("reference", f"was made with backbone {reference.fingerprint}, the burst with {target.fingerprint}; their tokens cannot be compared")
+        raise InvalidInput(
+            "reference", f"was made with backbone {reference.fingerprint}, the burst with {target.fingerprint}; their tokens cannot be compared"
+        )
     for index, view in enumerate(target.views):
         if view.camera is None:
             raise InvalidInput(f"views[{index}].K", "is missing: a pose needs K and world_from_camera for every view")
     if not len(target.cloud_m):
         raise InvalidInput("views", "no depth was measured on the object: a 7-D pose needs depth in at least one view")
-
-
-def _pool(found: PairMatches, pairs: Sequence[tuple[int, int]]) -> Matches:
-    """The correspondences of some view pairs, all inliers until a fit says otherwise."""
-    reference_view, target_view = (np.array([pair[side] for pair in pairs], dtype=np.intp) for side in (0, 1))
-    valid = found.valid[reference_view, target_view].numpy()
-    rows, _ = np.nonzero(valid)
-    patches = [each[reference_view, target_view].numpy()[valid] for each in (found.reference_patch, found.target_patch, found.similarity)]
-    return Matches(reference_view[rows], patches[0], target_view[rows], patches[1], patches[2], np.ones(len(rows), dtype=bool))
-
-
-def _points(views: Sequence[EncodedView], view_index: NDArray[np.intp], patch: NDArray[np.intp]) -> FloatArray:
-    if not len(view_index):
-        return np.zeros((0, 3))
-    return np.stack([views[view].points_m[index] for view, index in zip(view_index, patch)])
-
-
-def _to_all_patches(matches: Matches, reference: Sequence[EncodedView], target: Sequence[EncodedView]) -> Matches:
-    """Patch indices among the trusted patches become indices among all of a view's patches."""
-
-    def lift(views: Sequence[EncodedView], view_index: NDArray[np.intp], patch: NDArray[np.intp]) -> NDArray[np.intp]:
-        trusted = [np.flatnonzero(view.trusted) for view in views]
-        return np.array([trusted[view][index] for view, index in zip(view_index, patch)], dtype=np.intp)
-
-    return replace(
-        matches,
-        reference_patch=lift(reference, matches.reference_view, matches.reference_patch),
-        target_patch=lift(target, matches.target_view, matches.target_patch),
-    )

@@ -9,7 +9,8 @@ from core.clock import StageClock
 from core.encode import EncodedBurst, Encoder
 from core.errors import InvalidInput, NoPose, TooFewViews
 from core.novelty import Decision, decide, named_score
-from core.pose import PoseConfig, PoseEstimate, PoseEstimator
+from core.matches import PoseEstimate
+from core.pose import PoseConfig, PoseEstimator
 from core.reference import MIN_VIEWS, Reference, build_reference
 from core.scan import DEFAULT_VIEWPOINTS, ScanRequest, request_scan
 from core.views import Burst

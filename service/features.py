@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from core.crop import Window
 from core.encode import EncodedBurst, EncodedView
-from core.pose import Matches, PoseEstimate
+from core.matches import Matches, PoseEstimate
 from core.views import Camera
 
 Array = NDArray[Any]

@@ -1,16 +1,68 @@
-"""Many similarities at once: Umeyama's closed form over a batch of small samples.
+"""Many similarities at once, and Umeyama's closed form over a batch of small samples.
 
-Letters: T trials, S points a sample.
+Letters: T transforms, S points a sample, N points.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+
 import torch
 from torch import Tensor
 
+from core.sim3 import Sim3
 
-def umeyama_batch(source: Tensor, target: Tensor, weights: Tensor | None = None) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-    """scale (T,), rotation (T, 3, 3), translation (T, 3) and whether each is determined (T,), from shapes (T, S, 3).
+RANK_TOLERANCE = 1e-4
+"""Second singular value over the first below which a sample counts as collinear (single precision)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sim3Batch:
+    """T transforms b_from_a."""
+
+    scale: Tensor
+    """Shape (T,)."""
+    rotation: Tensor
+    """Shape (T, 3, 3)."""
+    translation: Tensor
+    """Shape (T, 3)."""
+
+    def __len__(self) -> int:
+        return len(self.scale)
+
+    def apply(self, points: Tensor) -> Tensor:
+        """Points of frame a, shape (N, 3) or (T, N, 3), in frame b, shape (T, N, 3)."""
+        return self.scale[:, None, None] * (points @ self.rotation.transpose(1, 2)) + self.translation[:, None]
+
+    def select(self, index: Tensor | Sequence[int]) -> Sim3Batch:
+        """The transforms at `index`."""
+        chosen = torch.as_tensor(index)
+        return Sim3Batch(self.scale[chosen], self.rotation[chosen], self.translation[chosen])
+
+    def where(self, keep: Tensor, other: Sim3Batch) -> Sim3Batch:
+        """These transforms where `keep`, shape (T,), else the other's."""
+        return Sim3Batch(
+            torch.where(keep, self.scale, other.scale),
+            torch.where(keep[:, None, None], self.rotation, other.rotation),
+            torch.where(keep[:, None], self.translation, other.translation),
+        )
+
+    def __getitem__(self, index: int) -> Sim3:
+        return Sim3(float(self.scale[index]), self.rotation[index].double().numpy(), self.translation[index].double().numpy())
+
+    @staticmethod
+    def concatenate(batches: Sequence[Sim3Batch]) -> Sim3Batch:
+        """All transforms of several batches."""
+        return Sim3Batch(
+            torch.cat([batch.scale for batch in batches]),
+            torch.cat([batch.rotation for batch in batches]),
+            torch.cat([batch.translation for batch in batches]),
+        )
+
+
+def umeyama_batch(source: Tensor, target: Tensor, weights: Tensor | None = None) -> tuple[Sim3Batch, Tensor]:
+    """The similarities of least squares and whether each is determined, shape (T,), from points, shape (T, S, 3).
 
     Args:
         weights: non-negative, shape (T, S).
@@ -27,5 +79,5 @@ def umeyama_batch(source: Tensor, target: Tensor, weights: Tensor | None = None)
     rotation = (u * sign.unsqueeze(1)) @ vt
     scale = (singular * sign).sum(dim=1) / variance.clamp_min(1e-12)
     translation = target_mean.squeeze(1) - scale[:, None] * (rotation @ source_mean.transpose(1, 2)).squeeze(-1)
-    determined = (singular[:, 1] > 1e-4 * singular[:, 0]) & (scale > 0) & (variance > 1e-12)
-    return scale, rotation, translation, determined
+    determined = (singular[:, 1] > RANK_TOLERANCE * singular[:, 0]) & (scale > 0) & (variance > 1e-12)
+    return Sim3Batch(scale, rotation, translation), determined

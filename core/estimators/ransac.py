@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from torch import Tensor
 
 from core.errors import NoPose
 from core.estimators.base import MIN_CORRESPONDENCES, FloatArray, RobustFit, refit
-from core.estimators.batched import umeyama_batch
+from core.estimators.batched import Sim3Batch, umeyama_batch
 from core.sim3 import Sim3, umeyama
 
 TRIALS = 1000
@@ -18,22 +19,28 @@ REFITS = 3
 """Rounds of least squares on the inliers."""
 
 
-def ransac(source: FloatArray, target: FloatArray, threshold_m: float, seed: int, *, trials: int = TRIALS) -> RobustFit:
+def ransac(source: FloatArray, target: FloatArray, threshold_m: float, seed: int) -> RobustFit:
     """The similarity with the largest inlier set, refitted to it. See `Estimator`."""
-    count = len(source)
-    if count < MIN_CORRESPONDENCES:
-        raise NoPose(f"{count} correspondences with measured depth; at least {MIN_CORRESPONDENCES} are needed: send more views or better depth")
-    sample = np.random.default_rng(seed).random((trials, count)).argpartition(MIN_CORRESPONDENCES - 1, axis=1)[:, :MIN_CORRESPONDENCES]
-    points, aims = torch.from_numpy(source.astype(np.float64)), torch.from_numpy(target.astype(np.float64))
-    scale, rotation, translation, determined = umeyama_batch(points[sample], aims[sample])
-    determined &= (scale < MAX_SCALE) & (scale > 1 / MAX_SCALE)
-    if not determined.any():
+    if len(source) < MIN_CORRESPONDENCES:
+        raise NoPose(
+            f"{len(source)} correspondences with measured depth; at least {MIN_CORRESPONDENCES} are needed: send more views or better depth"
+        )
+    trials, inliers = sample(source, target, threshold_m, TRIALS, seed)
+    if not len(trials):
         raise NoPose("every sample of correspondences is collinear or absurdly scaled; the views may show too little of the object")
-    moved = scale[:, None, None] * (points @ rotation.transpose(1, 2)) + translation[:, None]
-    inliers = (torch.linalg.norm(moved - aims, dim=-1) < threshold_m) & determined[:, None]
     best = int(inliers.sum(dim=1).argmax())
-    start = Sim3(float(scale[best]), rotation[best].numpy(), translation[best].numpy())
-    return _polish(source, target, start, inliers[best].numpy(), threshold_m)
+    return _polish(source, target, trials[best], inliers[best].numpy(), threshold_m)
+
+
+def sample(source: FloatArray, target: FloatArray, threshold_m: float, trials: int, seed: int) -> tuple[Sim3Batch, Tensor]:
+    """Similarities of random samples, the undetermined ones left out, and their inliers, shape (T, K), from shapes (K, 3), K ≥ 4."""
+    chosen = np.random.default_rng(seed).random((trials, len(source))).argpartition(MIN_CORRESPONDENCES - 1, axis=1)
+    chosen = chosen[:, :MIN_CORRESPONDENCES]
+    points, aims = torch.from_numpy(source.astype(np.float64)), torch.from_numpy(target.astype(np.float64))
+    transforms, determined = umeyama_batch(points[chosen], aims[chosen])
+    determined &= (transforms.scale < MAX_SCALE) & (transforms.scale > 1 / MAX_SCALE)
+    transforms = transforms.select(determined.nonzero().flatten())
+    return transforms, torch.linalg.norm(transforms.apply(points) - aims, dim=-1) < threshold_m
 
 
 def _polish(source: FloatArray, target: FloatArray, transform: Sim3, inlier: NDArray[np.bool_], threshold_m: float) -> RobustFit:

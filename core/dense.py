@@ -1,0 +1,89 @@
+"""How well a transform lays one object on another: over all foreground points, geometry times appearance.
+
+Letters: N reference points, Q target points, C descriptor size, T transforms.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from core.boxes import cloud_extent_m, inliers
+from core.encode import EncodedView
+from core.estimators.batched import Sim3Batch, umeyama_batch
+from core.views import FloatArray
+
+BATCH = 32
+"""Transforms scored at once; bounds memory at BATCH · N · Q numbers."""
+
+
+@dataclass(frozen=True)
+class DenseConfig:
+    """Settings of the dense score and of its refinement; lengths are shares of the target's extent."""
+
+    points: int = 400
+    """Points drawn from each object."""
+    sigma: float = 0.06
+    """Distance at which a point's agreement has fallen to 1/e."""
+    refine_sigmas: tuple[float, ...] = (0.12, 0.09, 0.06, 0.045)
+    """The same, shrinking over the rounds of refinement."""
+    temperature: float = 0.15
+    """Softness of a point's choice among the other object's points, in units of log agreement."""
+
+
+class DenseAgreement:
+    """Two objects' points and descriptors, ready to score and refine transforms between them."""
+
+    def __init__(
+        self,
+        reference: Sequence[EncodedView],
+        target: Sequence[EncodedView],
+        descriptors: tuple[Sequence[FloatArray], Sequence[FloatArray]],
+        config: DenseConfig,
+        seed: int,
+    ) -> None:
+        """From views with trusted patches only, and the unit descriptors of those patches, one array a view."""
+        self.config = config
+        self._reference, of_reference = _draw(reference, descriptors[0], config.points, seed)
+        self._target, of_target = _draw(target, descriptors[1], config.points, seed + 1)
+        self.extent_m = cloud_extent_m(self._target.numpy())
+        self._log_cosine = (of_reference @ of_target.T).clamp_min(1e-4).log()
+
+    def score(self, transforms: Sim3Batch) -> Tensor:
+        """Agreement in [0, 1], shape (T,): mean over points of max over the other object of exp(−(d/σ)²)·max(0, cosine),
+        geometric mean of both directions."""
+        parts = []
+        for start in range(0, len(transforms), BATCH):
+            log = self._log_agreement(transforms.select(range(start, min(start + BATCH, len(transforms)))), self.config.sigma)
+            parts.append((log.amax(dim=2).exp().mean(dim=1) * log.amax(dim=1).exp().mean(dim=1)).sqrt())
+        return torch.cat(parts)
+
+    def refine(self, transforms: Sim3Batch) -> Sim3Batch:
+        """Weighted least squares on soft matches in both directions, with a shrinking σ."""
+        for sigma in self.config.refine_sigmas:
+            log = self._log_agreement(transforms, sigma)
+            aims = (log / self.config.temperature).softmax(dim=2) @ self._target
+            starts = (log / self.config.temperature).softmax(dim=1).transpose(1, 2) @ self._reference
+            weights = torch.cat([log.amax(dim=2), log.amax(dim=1)], dim=1).exp()
+            count = len(transforms)
+            source = torch.cat([self._reference.expand(count, -1, -1), starts], dim=1)
+            target = torch.cat([aims, self._target.expand(count, -1, -1)], dim=1)
+            refined, determined = umeyama_batch(source, target, weights)
+            transforms = refined.where(determined, transforms)
+        return transforms
+
+    def _log_agreement(self, transforms: Sim3Batch, sigma: float) -> Tensor:
+        """Log of exp(−(d/σ)²)·max(0, cosine), shape (T, N, Q)."""
+        distance = torch.cdist(transforms.apply(self._reference), self._target.expand(len(transforms), -1, -1))
+        return self._log_cosine - (distance / (sigma * self.extent_m)) ** 2
+
+
+def _draw(views: Sequence[EncodedView], descriptors: Sequence[FloatArray], count: int, seed: int) -> tuple[Tensor, Tensor]:
+    """Random points without outliers, shape (N, 3), and their descriptors, shape (N, C)."""
+    points = np.concatenate([view.points_m for view in views])
+    kept = np.random.default_rng(seed).permutation(inliers(points))[:count]
+    return torch.from_numpy(points[kept]).float(), torch.from_numpy(np.concatenate(descriptors)[kept]).float()

@@ -1,0 +1,132 @@
+"""Many guesses of the transform, so that one of them is right: pooled, by consensus cluster, by view pair, by alignment.
+
+Letters: M reference views, N target views, T transforms.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+
+from core.boxes import cloud_extent_m
+from core.correspond import PairMatches
+from core.encode import EncodedView
+from core.estimators.base import MIN_CORRESPONDENCES
+from core.estimators.batched import Sim3Batch, umeyama_batch
+from core.estimators.ransac import sample
+from core.matches import end_points, pool
+from core.viewpoints import angles_deg, best_reference_per_target, consensus, relative_rotations
+from core.views import FloatArray
+
+Pairs = list[tuple[int, int]]
+
+
+@dataclass(frozen=True)
+class HypothesesConfig:
+    """How many guesses of each kind."""
+
+    pooled: int = 9
+    """From the correspondences of every target view's best reference view."""
+    pooled_trials: int = 1500
+    single_pairs: int = 16
+    """View pairs, the most similar first, each of which makes a guess alone."""
+    single_trials: int = 200
+    clustered_pairs: int = 30
+    """The most similar pairs, split into sets that agree on a rotation."""
+    clusters: int = 4
+    cluster_deg: float = 30.0
+    cluster_trials: int = 300
+    per_cluster: int = 2
+    aligned_pairs: int = 60
+    """Pairs taken for perfect alignments, with centre and size from the clouds."""
+    max_scale_ratio: float = 2.5
+    """A guess may differ by this factor from the ratio of the two clouds' extents."""
+
+
+def propose(
+    found: PairMatches,
+    similarity: FloatArray,
+    reference: Sequence[EncodedView],
+    target: Sequence[EncodedView],
+    config: HypothesesConfig,
+    threshold_m: float,
+    seed: int,
+) -> Sim3Batch:
+    """Guesses of target_from_reference; empty where nothing matches.
+
+    Args:
+        found, similarity: matches of the views' trusted patches and their S, shape (M, N).
+        threshold_m: inlier distance.
+    """
+    ranked = [(int(pair[0]), int(pair[1])) for pair in np.argwhere(similarity > 0)]
+    ranked.sort(key=lambda pair: -similarity[pair])
+    if not ranked:
+        return _none()
+    clouds = [np.concatenate([view.points_m for view in views]) for views in (reference, target)]
+    size_ratio = cloud_extent_m(clouds[1]) / max(cloud_extent_m(clouds[0]), 1e-9)
+    rotations = relative_rotations(reference, target)
+
+    def fit(pairs: Pairs, trials: int, keep: int) -> Sim3Batch:
+        source, aim = end_points(pool(found, pairs), reference, target)
+        return _best_samples(source, aim, threshold_m, trials, keep, seed)
+
+    batches = [fit([pair for pair in best_reference_per_target(similarity) if similarity[pair] > 0], config.pooled_trials, config.pooled)]
+    batches += [fit([pair], config.single_trials, 1) for pair in ranked[: config.single_pairs]]
+    for cluster in _clusters(ranked[: config.clustered_pairs], rotations, config, seed):
+        batches.append(fit(cluster, config.cluster_trials, config.per_cluster))
+    batches.append(_aligned([rotations[pair] for pair in ranked[: config.aligned_pairs]], clouds, size_ratio))
+    together = Sim3Batch.concatenate(batches)
+    off = together.scale / size_ratio
+    return together.select(((off < config.max_scale_ratio) & (off > 1 / config.max_scale_ratio)).nonzero().flatten())
+
+
+def distinct(transforms: Sim3Batch, scores: torch.Tensor, angle_deg: float, count: int) -> list[int]:
+    """Indices of up to `count` transforms, best score first, whose rotations differ by at least `angle_deg`."""
+    rotations = transforms.rotation.numpy().astype(float)
+    kept: list[int] = []
+    for index in scores.argsort(descending=True).tolist():
+        if not kept or angles_deg(rotations[index][None], rotations[kept]).min() >= angle_deg:
+            kept.append(index)
+        if len(kept) == count:
+            break
+    return kept
+
+
+def _best_samples(source: FloatArray, target: FloatArray, threshold_m: float, trials: int, keep: int, seed: int) -> Sim3Batch:
+    """The samples with the most inliers, each refitted to them."""
+    if len(source) < MIN_CORRESPONDENCES:
+        return _none()
+    transforms, inliers = sample(source, target, threshold_m, trials, seed)
+    best = inliers.sum(dim=1).topk(min(keep, len(transforms))).indices
+    weights = inliers[best].double()
+    count = len(best)
+    points, aims = (torch.from_numpy(each.astype(np.float64)).expand(count, -1, -1) for each in (source, target))
+    fitted, determined = umeyama_batch(points, aims, weights)
+    fitted = fitted.where(determined & (weights.sum(dim=1) >= MIN_CORRESPONDENCES), transforms.select(best))
+    return Sim3Batch(fitted.scale.float(), fitted.rotation.float(), fitted.translation.float())
+
+
+def _clusters(pairs: Pairs, rotations: FloatArray, config: HypothesesConfig, seed: int) -> list[Pairs]:
+    """Largest agreeing set, then the largest of the rest, and so on."""
+    clusters: list[Pairs] = []
+    while pairs and len(clusters) < config.clusters:
+        agree = consensus(np.stack([rotations[pair] for pair in pairs]), config.cluster_deg, seed)
+        if not agree.any():
+            break
+        clusters.append([pair for pair, kept in zip(pairs, agree) if kept])
+        pairs = [pair for pair, kept in zip(pairs, agree) if not kept]
+    return clusters
+
+
+def _aligned(rotations: list[FloatArray], clouds: list[FloatArray], size_ratio: float) -> Sim3Batch:
+    """Rotation as given, scale and translation such that extents and medians agree."""
+    centers = [torch.from_numpy(np.median(cloud, axis=0)).float() for cloud in clouds]
+    rotation = torch.from_numpy(np.stack(rotations)).float()
+    return Sim3Batch(torch.full((len(rotations),), size_ratio), rotation, centers[1] - size_ratio * (rotation @ centers[0]))
+
+
+def _none() -> Sim3Batch:
+    return Sim3Batch(torch.zeros(0), torch.zeros(0, 3, 3), torch.zeros(0, 3))

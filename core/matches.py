@@ -1,0 +1,105 @@
+"""What a pose estimate is made of: correspondences, the transform, its rivals.
+
+Letters: M reference views, N target views, K correspondences.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from core.correspond import PairMatches
+from core.encode import EncodedView
+from core.sim3 import Sim3
+from core.views import FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Matches:
+    """Correspondences of chosen view pairs."""
+
+    reference_view: NDArray[np.intp]
+    """Shape (K,)."""
+    reference_patch: NDArray[np.intp]
+    """Index into that view's `cells`, shape (K,)."""
+    target_view: NDArray[np.intp]
+    target_patch: NDArray[np.intp]
+    similarity: FloatArray
+    """Cosine, shape (K,)."""
+    inlier: NDArray[np.bool_]
+    """Whether each agrees with the transform, shape (K,)."""
+
+    def __len__(self) -> int:
+        return len(self.similarity)
+
+
+@dataclass(frozen=True, eq=False)
+class Alternative:
+    """Another pose that explains the views nearly as well."""
+
+    target_from_reference: Sim3
+    score: float
+
+
+@dataclass(frozen=True, eq=False)
+class PoseEstimate:
+    """A target's pose and what it rests on."""
+
+    target_from_reference: Sim3
+    matches: Matches
+    view_similarity: FloatArray
+    """S, shape (M, N)."""
+    pairs: tuple[tuple[int, int], ...]
+    """(reference view, target view) pairs whose correspondences were used."""
+    residual_m: float
+    """Root mean square distance over the inliers, metres of the target."""
+    score: float | None = None
+    """Dense agreement in [0, 1] (`core.dense`), where the variant computes it."""
+    confidence: float | None = None
+    """Probability that the rotation is within 30°, where the variant estimates one."""
+    alternatives: tuple[Alternative, ...] = ()
+    stage_ms: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def inliers(self) -> int:
+        """Correspondences that agree with the transform."""
+        return int(self.matches.inlier.sum())
+
+
+def pool(found: PairMatches, pairs: Sequence[tuple[int, int]]) -> Matches:
+    """The correspondences of some view pairs, all inliers until a fit says otherwise."""
+    reference_view, target_view = (np.array([pair[side] for pair in pairs], dtype=np.intp) for side in (0, 1))
+    valid = found.valid[reference_view, target_view].numpy()
+    rows, _ = np.nonzero(valid)
+    patches = [each[reference_view, target_view].numpy()[valid] for each in (found.reference_patch, found.target_patch, found.similarity)]
+    return Matches(reference_view[rows], patches[0], target_view[rows], patches[1], patches[2], np.ones(len(rows), dtype=bool))
+
+
+def end_points(matches: Matches, reference: Sequence[EncodedView], target: Sequence[EncodedView]) -> tuple[FloatArray, FloatArray]:
+    """The matched points in the two worlds, each (K, 3)."""
+    return (
+        _gather(reference, matches.reference_view, matches.reference_patch),
+        _gather(target, matches.target_view, matches.target_patch),
+    )
+
+
+def _gather(views: Sequence[EncodedView], view_index: NDArray[np.intp], patch: NDArray[np.intp]) -> FloatArray:
+    starts = np.cumsum([0, *(len(view.points_m) for view in views)])[:-1]
+    return np.concatenate([view.points_m for view in views])[starts[view_index] + patch]
+
+
+def among_all_patches(matches: Matches, reference: Sequence[EncodedView], target: Sequence[EncodedView]) -> Matches:
+    """Patch indices among the trusted patches become indices among all of a view's patches."""
+
+    def lift(views: Sequence[EncodedView], view_index: NDArray[np.intp], patch: NDArray[np.intp]) -> NDArray[np.intp]:
+        trusted = [np.flatnonzero(view.trusted) for view in views]
+        return np.array([trusted[view][index] for view, index in zip(view_index, patch)], dtype=np.intp)
+
+    return replace(
+        matches,
+        reference_patch=lift(reference, matches.reference_view, matches.reference_patch),
+        target_patch=lift(target, matches.target_view, matches.target_patch),
+    )
