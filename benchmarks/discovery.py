@@ -17,7 +17,7 @@ from benchmarks.encoded import encode_all, read_encoded
 from benchmarks.episodes import Counts, draw_orders, episode
 from benchmarks.pair_scores import PARTS, FloatArray, PairScores, auroc
 from benchmarks.parallel import map_jobs
-from benchmarks.tables import Row, machine, print_table, write_json
+from benchmarks.tables import Row, print_table, write_json
 from clients.datasets import folders
 from core.backbones.dino import load_backbone
 from core.encode import Encoder
@@ -90,7 +90,7 @@ def run(
             "fingerprint": network.fingerprint,
             "episode_seconds": seconds,
         }
-        write_json(json, {**meta, **machine()}, rows)
+        write_json(json, meta, rows)
     print_table(f"Discovery, {data}: {episodes} episodes of {length}", summaries, SUMMARY)
     return rows
 

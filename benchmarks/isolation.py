@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.encoded import encode_all, read_encoded
-from benchmarks.pairs import by_category
-from benchmarks.tables import machine, print_table, write_json
+from benchmarks.tables import print_table, write_json
 from clients.datasets import folders
 from core.backbones.dino import load_backbone
 from core.encode import EncodedView, Encoder, EncoderConfig
@@ -60,7 +59,7 @@ def run(
 
     Raises InvalidInput where no sequence has silhouettes, or for a source that the backbone does not have.
     """
-    groups = by_category(folders.find_sequences(data)).values()
+    groups = folders.by_category(folders.find_sequences(data)).values()
     sequences = [sequence for group in groups for sequence in group[: DEFAULT_LIMIT if limit is None else limit]]
     sequences = [sequence for sequence in sequences if any((sequence.path / "mask_visib").glob("*.png"))]
     if not sequences:
@@ -74,7 +73,7 @@ def run(
         )
     if json is not None:
         meta = {"benchmark": "isolation", "data": data, "limit": limit, "backbone": network.name, "fingerprint": network.fingerprint}
-        write_json(json, {**meta, **machine()}, [asdict(row) for row in rows])
+        write_json(json, meta, [asdict(row) for row in rows])
     print_table(f"Isolation, {data}", [asdict(row) for row in rows], COLUMNS)
     return rows
 

@@ -3,7 +3,7 @@
 A category is a set of bursts. Each score of `core.novelty` is made of parts that add up, or take their maximum, over the
 members of the set; with those parts kept for every pair, thousands of episodes need no token again.
 
-Letters: N bursts, G views of a burst (the most that any has), D token size; a leading * is any batch of sets.
+Letters: N bursts, G parts of a pair, D token size; a leading * is any batch of sets.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from scipy.stats import rankdata
 from core.descriptors import unit
 from core.encode import EncodedBurst
 from core.errors import InvalidInput
-from core.novelty import named_score
+from core.novelty import named_score, paper_sum
 
 FloatArray = NDArray[np.floating[Any]]
 
@@ -32,9 +32,9 @@ class PairScores:
     views: NDArray[np.intp]
     """Number of views of each burst, shape (N,)."""
     total: FloatArray
-    """The part that adds up over members, shape (N, N): the sum of cosines, or of each member view's best cosine."""
+    """The part that adds up over members, shape (N, N): the sum of cosines."""
     best: FloatArray
-    """The part that takes its maximum over members: the best cosine of each target view, shape (N, N, G); G is 0 where a score has none."""
+    """The part that takes its maximum over members, shape (N, N, G); G is 0 where a score has none."""
 
     @staticmethod
     def of(bursts: Sequence[EncodedBurst], score: str) -> PairScores:
@@ -43,15 +43,15 @@ class PairScores:
         if score not in PARTS:
             raise InvalidInput("score", f"{score!r} cannot be benchmarked over episodes; one of {', '.join(PARTS)} can")
         tokens = [unit(getattr(burst, token)) for burst in bursts]
-        count, most = len(tokens), max(map(len, tokens)) if PARTS[score] == "best view" else 0
+        count, most = len(tokens), 1 if PARTS[score] == "maximum" else 0
         total = np.zeros((count, count), dtype=np.float32)
         best = np.zeros((count, count, most), dtype=np.float32)
         for i, member in enumerate(tokens):
             for j, target in enumerate(tokens):
-                cosines = member @ target.T
-                total[i, j] = cosines.max(axis=1).sum() if most else cosines.sum()
                 if most:
-                    best[i, j, : len(target)] = cosines.max(axis=0)
+                    best[i, j] = named_score(score).similarity(member, target)
+                else:
+                    total[i, j] = paper_sum(member, target)
         return PairScores(score, np.array([len(each) for each in tokens]), total, best)
 
     def similarity(self, total: FloatArray, best: FloatArray, views: NDArray[Any], target: int) -> FloatArray:
@@ -66,7 +66,7 @@ class PairScores:
             return total
         if self.score == "paper_mean":
             return np.asarray(total / (views * self.views[target]))
-        return np.asarray((best.sum(axis=-1) / self.views[target] + total / views) / 2)
+        return best[..., 0]
 
     def single(self) -> FloatArray:
         """Similarity of every burst alone to every burst, shape (N, N)."""
@@ -74,7 +74,7 @@ class PairScores:
         return np.stack(columns, axis=1)
 
 
-PARTS = {"paper_sum": "sum", "paper_mean": "sum", "pooled_best_view": "best view"}
+PARTS = {"paper_sum": "sum", "paper_mean": "sum", "pooled_best_view": "maximum"}
 """How each score adds up over the bursts of a category."""
 
 

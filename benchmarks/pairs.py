@@ -39,7 +39,7 @@ def sample_pairs(sequences: Sequence[folders.Sequence], limit: int, seed: int) -
     Raises InvalidInput where no category has two instances, or one of them has no ground truth.
     """
     pairs: list[Pair] = []
-    for category, group in by_category(sequences).items():
+    for category, group in folders.by_category(sequences).items():
         candidates = [(a, b) for a in group for b in group if a.instance != b.instance]
         order = np.random.default_rng([seed, crc32(category.encode())]).permutation(len(candidates))
         pairs += [candidates[index] for index in order[:limit]]
@@ -58,11 +58,3 @@ def choose_views(name: str, role: str, available: int, count: int, seed: int) ->
     """
     rng = np.random.default_rng([seed, crc32(name.encode()), crc32(role.encode())])
     return sorted(rng.permutation(available)[:count].tolist())
-
-
-def by_category(sequences: Sequence[folders.Sequence]) -> dict[str, list[folders.Sequence]]:
-    """Sequences of each category, categories sorted by name."""
-    grouped: dict[str, list[folders.Sequence]] = {}
-    for sequence in sorted(sequences, key=lambda sequence: sequence.name):
-        grouped.setdefault(sequence.category, []).append(sequence)
-    return grouped

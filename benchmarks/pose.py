@@ -16,13 +16,12 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.accuracy import NO_POSE, accuracy, median
 from benchmarks.encoded import encode_all, read_encoded
 from benchmarks.pairs import Pair, ViewCounts, choose_views, sample_pairs
 from benchmarks.parallel import map_jobs, worker_count
-from benchmarks.tables import machine, print_table, write_json
+from benchmarks.tables import print_table, write_json
 from clients.datasets import folders
-from clients.pose_error import PoseError, pose_error
+from clients.pose_error import NO_POSE, PoseError, accuracy, median, pose_error
 from core.backbones.dino import load_backbone
 from core.descriptors import KEPT_COMPONENTS
 from core.encode import EncodedBurst, Encoder
@@ -149,7 +148,7 @@ def run(
             "workers": worker_count(len(jobs)),
             "threads_per_worker": 1,
         }
-        write_json(json, {**meta, **machine()}, [asdict(row) for row in rows])
+        write_json(json, meta, [asdict(row) for row in rows])
     print_table(f"Pose, {data}", [asdict(row) for row in rows], COLUMNS)
     return rows
 

@@ -15,10 +15,10 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from benchmarks.pairs import by_category
 from benchmarks.parallel import bar
-from benchmarks.tables import machine, print_table, write_json
+from benchmarks.tables import print_table, write_json
 from clients.datasets import folders
+from clients.datasets.samples import data_or_samples
 from core.backbones.dino import load_backbone
 from core.encode import EncodedBurst, Encoder
 from core.errors import InvalidInput
@@ -27,8 +27,6 @@ from core.pose import VARIANTS, PoseConfig, PoseEstimator
 from core.reference import Reference, build_reference
 from core.views import Burst
 
-SAMPLES = Path(__file__).resolve().parents[1] / "tests" / "data" / "bursts"
-"""The recordings of the repository."""
 WARM_UP = 1
 """Rounds that are not counted: first calls allocate and load."""
 Operation = Callable[[], dict[str, float]]
@@ -64,7 +62,7 @@ def run(
 
     Raises InvalidInput where no category of `data` has two objects with so many views.
     """
-    reference_burst, target_burst = (folders.load_burst(each, range(views)) for each in _two_objects(data or SAMPLES, views))
+    reference_burst, target_burst = (folders.load_burst(each, range(views)) for each in _two_objects(data_or_samples(data), views))
     network = load_backbone(backbone, device=device)
     encoder = Encoder(network)
     scanned, target = encoder.encode(reference_burst), encoder.encode(target_burst)
@@ -83,7 +81,7 @@ def run(
             "device": device,
             "threads": torch.get_num_threads(),
         }
-        write_json(json, {**meta, **machine()}, [asdict(row) for row in rows])
+        write_json(json, meta, [asdict(row) for row in rows])
     print_table(f"Speed, {views} + {views} views, {torch.get_num_threads()} threads", [asdict(row) for row in rows], COLUMNS)
     return rows
 
@@ -135,7 +133,7 @@ def _solve(estimator: PoseEstimator, reference: Reference, target: EncodedBurst)
 
 
 def _two_objects(data: Path, views: int) -> list[folders.Sequence]:
-    for group in by_category(folders.find_sequences(data)).values():
+    for group in folders.by_category(folders.find_sequences(data)).values():
         enough = [sequence for sequence in group if len(sequence.images) >= views]
         if len(enough) > 1:
             return enough[:2]

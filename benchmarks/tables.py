@@ -49,9 +49,9 @@ def print_table(title: str, rows: Sequence[Row], columns: Sequence[str]) -> None
 
 
 def write_json(path: Path, meta: Meta, rows: Sequence[Row]) -> None:
-    """Writes `{"meta", "rows"}`; values that are not finite become null, since JSON has no infinity."""
+    """Writes `{"meta", "rows"}`, the machine in `meta` too; values that are not finite become null, since JSON has no infinity."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(json.dumps({"meta": _plain(meta), "rows": _plain(rows)}, indent=1, allow_nan=False) + "\n")
+    path.write_text(json.dumps({"meta": _plain({**meta, **machine()}), "rows": _plain(rows)}, indent=1, allow_nan=False) + "\n")
 
 
 def _plain(value: object) -> object:

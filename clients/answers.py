@@ -31,7 +31,10 @@ class Pose:
     """Its corners in the burst's world frame, shape (8, 3), metres."""
     inliers: int
     correspondences: int
+    best_view: int
+    """The burst's view in which most correspondences agree; its pictures tell most."""
     residual_m: float
+    score: float | None
     confidence: float | None
 
     @property
@@ -64,7 +67,9 @@ class Pose:
             np.array(fields["box"]["corners_m"]),
             fields["inliers"],
             fields["correspondences"],
+            fields["best_view"],
             fields["residual_m"],
+            fields["score"],
             fields["confidence"],
         )
 

@@ -1,4 +1,4 @@
-"""How far an estimated 7-D transform is from the truth, modulo the object's symmetries."""
+"""How far an estimated 7-D transform is from the truth, modulo the object's symmetries, and figures over many."""
 
 from __future__ import annotations
 
@@ -23,6 +23,10 @@ class PoseError:
     """|log(estimated scale / true scale)|, natural logarithm."""
 
 
+NO_POSE = PoseError(180.0, np.inf, np.inf)
+"""What a refused pose counts as: the worst there is."""
+
+
 def pose_error(estimate: Sim3, reference_from_model: Sim3, target_from_model: Sim3, symmetries: Sequence[FloatArray] = ()) -> PoseError:
     """The error of `estimate`, a target_from_reference.
 
@@ -40,3 +44,13 @@ def pose_error(estimate: Sim3, reference_from_model: Sim3, target_from_model: Si
         translation=float(np.linalg.norm(landed - target_from_model.translation) / target_from_model.scale),
         log_scale=float(abs(np.log(estimate.scale / target_from_reference.scale))),
     )
+
+
+def accuracy(errors: Sequence[PoseError], threshold_deg: float) -> float:
+    """Percentage of `errors` whose rotation is at most `threshold_deg` off."""
+    return 100 * float(np.mean([error.rotation_deg <= threshold_deg for error in errors]))
+
+
+def median(errors: Sequence[PoseError], field: str) -> float:
+    """Median of one field of PoseError; infinite where at least half of the poses were refused."""
+    return float(np.median([getattr(error, field) for error in errors]))

@@ -103,7 +103,8 @@ class RobotClient:
     def observe(self, burst: Burst, *, frame: str | None = None, **options: str | float | bool) -> Observation:
         """What `burst` shows: a known object with its pose, or a novel one with a scan to carry out.
 
-        `options` are the request's: `category_id`, `threshold`, `views_used`, `learn`, `variant`, `seed`, `include`.
+        A known object's burst joins its category, unless `learn=False`. `options` are the request's: `learn`, `category_id`, `threshold`,
+        `views_used`, `variant`, `seed`, `include`.
         """
         answer = self.post("/v1/observations", files=burst_parts(burst, frame), params=options)
         return Observation(

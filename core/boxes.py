@@ -70,7 +70,9 @@ def inliers(points: FloatArray) -> NDArray[np.intp]:
 def oriented_box(points: FloatArray) -> OrientedBox:
     """The box along the principal axes of the convex hull of points, shape (N, 3); thin for a flat object. Raises NoObject for too few."""
     if len(points) < MIN_POINTS:
-        raise NoObject("views", f"only {len(points)} object points have measured depth; at least {MIN_POINTS} are needed: check the depth images")
+        raise NoObject(
+            "views", f"only {len(points)} object points have measured depth; at least {MIN_POINTS} are needed: check the depth images"
+        )
     cloud = _cloud(points)
     try:
         box = cloud.get_oriented_bounding_box()

@@ -45,10 +45,8 @@ class Window:
         inside = image[max(0, self.y0) : self.y0 + self.size, max(0, self.x0) : self.x0 + self.size]
         fill = PADDING_RGB if image.ndim == 3 else 0
         padded = cv2.copyMakeBorder(inside, top, bottom, left, right, cv2.BORDER_CONSTANT, value=fill)
-        if nearest:
-            mode = cv2.INTER_NEAREST_EXACT
-        else:
-            mode = cv2.INTER_AREA if side < self.size else cv2.INTER_CUBIC
+        smooth = cv2.INTER_AREA if side < self.size else cv2.INTER_CUBIC
+        mode = cv2.INTER_NEAREST_EXACT if nearest else smooth
         return cv2.resize(padded, (side, side), interpolation=mode)
 
     def paste(self, soft: FloatArray, size: tuple[int, int]) -> FloatArray:

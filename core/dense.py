@@ -29,8 +29,11 @@ class DenseConfig:
     """Points drawn from each object."""
     sigma: float = 0.06
     """Distance at which a point's agreement has fallen to 1/e."""
-    refine_sigmas: tuple[float, ...] = (0.12, 0.09, 0.06, 0.045)
-    """The same, shrinking over the rounds of refinement."""
+    refine_sigmas: tuple[float, ...] = (0.15, 0.12, 0.12)
+    """The same in each round of refinement. Wide: other objects of a category are of other shape, and surfaces laid close upon
+    each other turn it away from what looks alike."""
+    refine_power: float = 5.0
+    """Exponent of the cosine in refinement, which makes appearance outweigh distance there."""
     temperature: float = 0.15
     """Softness of a point's choice among the other object's points, in units of log agreement."""
 
@@ -58,14 +61,15 @@ class DenseAgreement:
         geometric mean of both directions."""
         parts = []
         for start in range(0, len(transforms), BATCH):
-            log = self._log_agreement(transforms.select(range(start, min(start + BATCH, len(transforms)))), self.config.sigma)
+            batch = transforms.select(range(start, min(start + BATCH, len(transforms))))
+            log = self._log_agreement(batch, self.config.sigma, 1.0)
             parts.append((log.amax(dim=2).exp().mean(dim=1) * log.amax(dim=1).exp().mean(dim=1)).sqrt())
         return torch.cat(parts)
 
     def refine(self, transforms: Sim3Batch) -> Sim3Batch:
-        """Weighted least squares on soft matches in both directions, with a shrinking σ."""
+        """Rounds of weighted least squares on soft matches in both directions."""
         for sigma in self.config.refine_sigmas:
-            log = self._log_agreement(transforms, sigma)
+            log = self._log_agreement(transforms, sigma, self.config.refine_power)
             aims = (log / self.config.temperature).softmax(dim=2) @ self._target
             starts = (log / self.config.temperature).softmax(dim=1).transpose(1, 2) @ self._reference
             weights = torch.cat([log.amax(dim=2), log.amax(dim=1)], dim=1).exp()
@@ -76,10 +80,10 @@ class DenseAgreement:
             transforms = refined.where(determined, transforms)
         return transforms
 
-    def _log_agreement(self, transforms: Sim3Batch, sigma: float) -> Tensor:
-        """Log of exp(−(d/σ)²)·max(0, cosine), shape (T, N, Q)."""
+    def _log_agreement(self, transforms: Sim3Batch, sigma: float, power: float) -> Tensor:
+        """Log of exp(−(d/σ)²)·max(0, cosine)^power, shape (T, N, Q)."""
         distance = torch.cdist(transforms.apply(self._reference), self._target.expand(len(transforms), -1, -1))
-        return self._log_cosine - (distance / (sigma * self.extent_m)) ** 2
+        return power * self._log_cosine - (distance / (sigma * self.extent_m)) ** 2
 
 
 def _draw(views: Sequence[EncodedView], descriptors: Sequence[FloatArray], count: int, seed: int) -> tuple[Tensor, Tensor]:

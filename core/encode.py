@@ -63,6 +63,8 @@ class EncodedView:
     """Soft foreground over the close crop, shape (G, G)."""
     cls: FloatArray
     """[CLS] of the close crop, shape (D,)."""
+    pooled: FloatArray
+    """Mean foreground token, whitened where the backbone has statistics, shape (D,); zero where there is no foreground."""
     camera: Camera | None
 
     @property
@@ -80,13 +82,6 @@ class EncodedView:
         """(x, y) in the image of the patches' centres, shape (P, 2)."""
         return self.window.to_pixels(self.cells, self.grid)
 
-    @property
-    def pooled(self) -> FloatArray:
-        """Mean of the foreground tokens, shape (D,); zero where there are none."""
-        if not len(self.descriptors):
-            return np.zeros(self.descriptors.shape[1], dtype=np.float32)
-        return np.asarray(self.descriptors.mean(axis=0))
-
 
 @dataclass(frozen=True, eq=False)
 class EncodedBurst:
@@ -99,13 +94,17 @@ class EncodedBurst:
 
     @property
     def cls(self) -> FloatArray:
-        """Shape (V, D)."""
-        return np.stack([view.cls for view in self.views])
+        """Of the views that show an object, shape (V, D)."""
+        return np.stack([view.cls for view in self._shown])
 
     @property
     def pooled(self) -> FloatArray:
-        """Shape (V, D)."""
-        return np.stack([view.pooled for view in self.views])
+        """Of the views that show an object, shape (V, D)."""
+        return np.stack([view.pooled for view in self._shown])
+
+    @property
+    def _shown(self) -> tuple[EncodedView, ...]:
+        return tuple(view for view in self.views if len(view.cells))
 
     @cached_property
     def cloud_m(self) -> FloatArray:
@@ -173,7 +172,9 @@ class Encoder:
         depth, usable = _cut_depth(view, view.depth_m, window, side)
         cells = np.argwhere(np.ones_like(usable))
         points = view.camera.in_camera(window.to_pixels(cells, side), depth.reshape(-1)).reshape(side, side, 3)
-        return vote_by_support(soft, points, usable, window.size / float(view.camera.K[0, 0]) * float(np.median(depth[usable])) if usable.any() else 1.0)
+        return vote_by_support(
+            soft, points, usable, window.size / float(view.camera.K[0, 0]) * float(np.median(depth[usable])) if usable.any() else 1.0
+        )
 
     def _assemble(self, view: View, window: Window, soft: FloatArray, tokens: FloatArray, cls: FloatArray) -> EncodedView:
         grid = self.config.grid
@@ -186,7 +187,13 @@ class Encoder:
             depths = cell_depth(depth, usable & inside, grid)[foreground]
             points = view.camera.back_project(window.to_pixels(cells, grid), depths).astype(np.float32)
         small = soft.reshape(grid, SAMPLES, grid, SAMPLES).mean(axis=(1, 3)).astype(np.float32)
-        return EncodedView(grid, window, cells, tokens[foreground], points, small, cls, view.camera)
+        return EncodedView(grid, window, cells, tokens[foreground], points, small, cls, self._pool(tokens[foreground]), view.camera)
+
+    def _pool(self, tokens: FloatArray) -> FloatArray:
+        if not len(tokens):
+            return np.zeros(self.backbone.dim, dtype=np.float32)
+        mean = tokens.mean(axis=0)
+        return mean if self.backbone.whitening is None else self.backbone.whitening.apply(mean)
 
     def _component(self, soft: FloatArray) -> NDArray[np.bool_]:
         """The object in the close crop; nothing where nothing is clearly foreground."""

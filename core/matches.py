@@ -57,7 +57,7 @@ class PoseEstimate:
     residual_m: float
     """Root mean square distance over the inliers, metres of the target."""
     score: float | None = None
-    """Dense agreement in [0, 1] (`core.dense`), where the variant computes it."""
+    """How well the pose explains both objects (`core.dense`, times the agreement of view pairs), where the variant computes it."""
     confidence: float | None = None
     """Probability that the rotation is within 30°, where the variant estimates one."""
     alternatives: tuple[Alternative, ...] = ()

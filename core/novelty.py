@@ -27,7 +27,7 @@ class Member:
     cls: FloatArray
     """[CLS] of each view, shape (V, D)."""
     pooled: FloatArray
-    """Mean foreground token of each view, shape (V, D)."""
+    """Mean foreground token of each view, whitened where the backbone has statistics, shape (V, D)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,12 +54,12 @@ def paper_mean(category: FloatArray, target: FloatArray) -> float:
     return paper_sum(category, target) / (len(category) * len(target))
 
 
-def best_view(category: FloatArray, target: FloatArray) -> float:
-    """Mean over views of the cosine to the other side's most similar view, both directions.
+def best_view(burst: FloatArray, target: FloatArray) -> float:
+    """Mean over views of the cosine to the other burst's most similar view, both directions, from unit tokens (F, D), (G, D).
 
     Opposite sides of one object look unalike; averaging over them, as the paper's f does, hides a good match.
     """
-    cosines = category @ target.T
+    cosines = burst @ target.T
     return float((cosines.max(axis=0).mean() + cosines.max(axis=1).mean()) / 2)
 
 
@@ -69,14 +69,16 @@ class Score:
 
     token: Literal["cls", "pooled"]
     similarity: Callable[[FloatArray, FloatArray], float]
+    over: Literal["views", "bursts"]
+    """`views`: a category is one set of tokens, as in the paper. `bursts`: it is as similar as its most similar burst."""
     threshold: float
     """Above it a burst is known."""
 
 
 SCORES = {
-    "paper_sum": Score("cls", paper_sum, 40.0),
-    "paper_mean": Score("cls", paper_mean, 0.4),
-    "pooled_best_view": Score("pooled", best_view, 0.7),
+    "paper_sum": Score("cls", paper_sum, "views", 80.0),
+    "paper_mean": Score("cls", paper_mean, "views", 0.8),
+    "pooled_best_view": Score("pooled", best_view, "bursts", 0.4),
 }
 DEFAULT_SCORE = "pooled_best_view"
 
@@ -96,7 +98,13 @@ def decide(memory: Sequence[Member], target: EncodedBurst, *, score: str = DEFAU
     for member in memory:
         tokens.setdefault(member.category_id, []).append(getattr(member, named.token))
     asked = unit(getattr(target, named.token))
-    similarities = {category: named.similarity(unit(np.concatenate(each)), asked) for category, each in tokens.items()}
+    similarities = {category: _similarity(named, [unit(each) for each in bursts], asked) for category, bursts in tokens.items()}
     ranked = tuple(sorted(similarities.items(), key=lambda entry: (-entry[1], entry[0])))
     known = bool(ranked) and ranked[0][1] > limit
     return Decision("known" if known else "novel", score, limit, ranked)
+
+
+def _similarity(score: Score, bursts: Sequence[FloatArray], target: FloatArray) -> float:
+    if score.over == "views":
+        return score.similarity(np.concatenate(bursts), target)
+    return max(score.similarity(burst, target) for burst in bursts)

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+import torch
 
 from core.boxes import cloud_extent_m
 from core.clock import StageClock
@@ -22,7 +23,7 @@ from core.hypotheses import HypothesesConfig, distinct, propose
 from core.matches import Alternative, Matches, PoseEstimate, among_all_patches, end_points, pool
 from core.reference import Reference
 from core.sim3 import Sim3
-from core.viewpoints import best_reference_per_target, consensus, relative_rotations
+from core.viewpoints import best_reference_per_target, consensus, relative_rotations, view_agreement
 from core.views import FloatArray
 
 Pairs = list[tuple[int, int]]
@@ -34,6 +35,12 @@ class BestConfig:
 
     hypotheses: HypothesesConfig = field(default_factory=HypothesesConfig)
     dense: DenseConfig = field(default_factory=DenseConfig)
+    polish: DenseConfig = field(default_factory=lambda: DenseConfig(points=1200))
+    """For the last refinement, of the winner alone."""
+    view_weight: float = 0.25
+    """Weight of the agreement of view pairs beside the log of the dense score."""
+    view_deg: float = 40.0
+    """Angle over which a view pair speaks for a rotation."""
     refined: int = 12
     """Hypotheses that are refined: the best of those that differ in rotation."""
     distinct_deg: float = 12.0
@@ -131,20 +138,18 @@ class PoseEstimator:
         clock.lap("score")
         refined = agreement.refine(guesses.select(promising))
         scores = agreement.score(refined)
+        views = view_agreement(refined.rotation.numpy(), relative_rotations(pair.reference, pair.target), pair.similarity, config.view_deg)
+        scores = scores * torch.from_numpy(np.exp(config.view_weight * views))
         ranked = distinct(refined, scores, config.alternative_deg, 1 + config.alternatives)
         clock.lap("refine")
+        polish = DenseAgreement(pair.reference, pair.target, pair.descriptors, config.polish, seed)
+        transform = polish.refine(refined.select(ranked[:1]))[0]
+        clock.lap("polish")
         pairs = pair.best_pairs()
-        matches, residual_m = _judge(pool(pair.found, pairs), refined[ranked[0]], pair, threshold_m)
+        matches, residual_m = _judge(pool(pair.found, pairs), transform, pair, threshold_m)
         alternatives = tuple(Alternative(refined[index], float(scores[index])) for index in ranked[1:])
-        return PoseEstimate(
-            refined[ranked[0]],
-            matches,
-            pair.similarity,
-            tuple(pairs),
-            residual_m,
-            score=float(scores[ranked[0]]),
-            alternatives=alternatives,
-        )
+        score = float(scores[ranked[0]])
+        return PoseEstimate(transform, matches, pair.similarity, tuple(pairs), residual_m, score=score, alternatives=alternatives)
 
 
 class _Pair:
@@ -185,7 +190,8 @@ def require_comparable(reference: Reference, target: EncodedBurst) -> None:
     """Raises InvalidInput where descriptors, cameras or depth do not allow a 7-D pose."""
     if reference.fingerprint != target.fingerprint:
         raise InvalidInput(
-            "reference", f"was made with backbone {reference.fingerprint}, the burst with {target.fingerprint}; their tokens cannot be compared"
+            "reference",
+            f"was made with backbone {reference.fingerprint}, the burst with {target.fingerprint}; their tokens cannot be compared",
         )
     for index, view in enumerate(target.views):
         if view.camera is None:

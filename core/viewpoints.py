@@ -57,6 +57,18 @@ def consensus(rotations: FloatArray, angle_deg: float, seed: int) -> NDArray[np.
     return np.asarray(near[:, int(near.sum(axis=0).argmax())])
 
 
-def mean_rotation(rotations: FloatArray, weights: FloatArray | None = None) -> FloatArray:
-    """The chordal mean of rotations, shape (3, 3), from shape (Q, 3, 3)."""
-    return np.asarray(Rotation.from_matrix(rotations).mean(weights).as_matrix())
+def view_agreement(rotations: FloatArray, relative: FloatArray, view_similarity: FloatArray, angle_deg: float) -> FloatArray:
+    """How much more similar than others the view pairs are that a rotation brings together, shape (T,).
+
+    The similarities of each target view are standardised over the reference views, then averaged with weights that fall off with the
+    angle between a pair's relative rotation and the one asked about. It tells front from back where single patches cannot.
+
+    Args:
+        rotations: target_from_reference, shape (T, 3, 3).
+        relative: of `relative_rotations`, shape (M, N, 3, 3).
+        view_similarity: S, shape (M, N).
+    """
+    spread = view_similarity.std(axis=0)
+    standard = (view_similarity - view_similarity.mean(axis=0)) / np.where(spread > 0, spread, 1.0)
+    weights = np.exp(-((angles_deg(rotations, relative.reshape(-1, 3, 3)) / angle_deg) ** 2))
+    return weights @ standard.ravel() / np.maximum(weights.sum(axis=1), 1e-6)

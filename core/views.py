@@ -27,7 +27,9 @@ def require_rotation(rotation: FloatArray, field: str) -> None:
     """Raises InvalidInput unless `rotation`, shape (3, 3), is orthonormal and right-handed."""
     error = float(np.abs(rotation.T @ rotation - np.eye(3)).max())
     if error > ROTATION_TOLERANCE:
-        raise InvalidInput(field, f"its upper-left 3×3 block is not a rotation (|RᵀR − I| is {error:.2g}); send an orthonormal matrix without scale")
+        raise InvalidInput(
+            field, f"its upper-left 3×3 block is not a rotation (|RᵀR − I| is {error:.2g}); send an orthonormal matrix without scale"
+        )
     if np.linalg.det(rotation) < 0:
         raise InvalidInput(field, "its rotation is left-handed (determinant −1); use OpenCV's camera axes: x right, y down, z forward")
 
@@ -117,14 +119,22 @@ class View:
             raise InvalidInput(f"{field}.rgb", f"expected (H, W, 3) of uint8, found {self.rgb.shape} of {self.rgb.dtype}")
         height, width = self.size
         if min(height, width) < 32 or height * width > MAX_PIXELS:
-            raise InvalidInput(f"{field}.rgb", f"is {width}×{height} pixels; expected at least 32 a side and at most {MAX_PIXELS // 1_000_000} megapixels")
+            raise InvalidInput(
+                f"{field}.rgb", f"is {width}×{height} pixels; expected at least 32 a side and at most {MAX_PIXELS // 1_000_000} megapixels"
+            )
         if self.camera is not None:
             self.camera.validate(field)
             cx, cy = float(self.camera.K[0, 2]), float(self.camera.K[1, 2])
             if not (0 < cx < width and 0 < cy < height):
-                raise InvalidInput(f"{field}.K", f"its principal point ({cx:.0f}, {cy:.0f}) is outside the {width}×{height} image; scale K to this resolution")
+                raise InvalidInput(
+                    f"{field}.K",
+                    f"its principal point ({cx:.0f}, {cy:.0f}) is outside the {width}×{height} image; scale K to this resolution",
+                )
             if max(abs(cx / width - 0.5), abs(cy / height - 0.5)) > 0.2:
-                raise InvalidInput(f"{field}.K", f"its principal point ({cx:.0f}, {cy:.0f}) is far from the centre of the {width}×{height} image: K is of another resolution")
+                raise InvalidInput(
+                    f"{field}.K",
+                    f"its principal point ({cx:.0f}, {cy:.0f}) is far from the centre of the {width}×{height} image: K is of another resolution",
+                )
         self._validate_depth(field)
         if self.mask is not None:
             if self.mask.shape != (height, width):
@@ -137,7 +147,10 @@ class View:
         if depth is None:
             return
         if depth.shape != self.size:
-            raise InvalidInput(f"{field}.depth", f"expected {self.size[1]}×{self.size[0]} pixels like rgb (align depth to colour), found shape {depth.shape}")
+            raise InvalidInput(
+                f"{field}.depth",
+                f"expected {self.size[1]}×{self.size[0]} pixels like rgb (align depth to colour), found shape {depth.shape}",
+            )
         if not np.isfinite(depth).all():
             raise InvalidInput(f"{field}.depth", "has NaN or infinite values; send 0 where nothing was measured")
         measured = depth[depth != 0]
@@ -149,7 +162,9 @@ class View:
         if median > MAX_DEPTH_M:
             raise InvalidInput(f"{field}.depth", f"its median is {median:.0f} m: millimetres sent as metres? Set depth_scale to 0.001")
         if median < 0.01:
-            raise InvalidInput(f"{field}.depth", f"its median is {median * 1000:.2g} mm: depth_scale is metres a unit, so 0.001 for millimetre images")
+            raise InvalidInput(
+                f"{field}.depth", f"its median is {median * 1000:.2g} mm: depth_scale is metres a unit, so 0.001 for millimetre images"
+            )
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,13 +8,14 @@ from core.backbones.base import Backbone
 from core.clock import StageClock
 from core.encode import EncodedBurst, Encoder
 from core.errors import InvalidInput, NoPose, TooFewViews
-from core.novelty import Decision, decide, named_score
 from core.matches import PoseEstimate
+from core.novelty import Decision, decide, named_score
+from core.packing import burst_from_arrays
 from core.pose import PoseConfig, PoseEstimator
 from core.reference import MIN_VIEWS, Reference, build_reference
 from core.scan import DEFAULT_VIEWPOINTS, ScanRequest, request_scan
 from core.views import Burst
-from service.features import burst_from_arrays, features_as_arrays
+from service.features import best_pair, features_as_arrays
 from store.memory import Memory
 from store.observations import Answer
 from store.records import Category, Observation, Pose, Scan
@@ -38,8 +39,8 @@ class ObserveOptions:
     """Takes the object for one of this category and skips the decision."""
     threshold: float | None = None
     variant: str | None = None
-    learn: bool = False
-    """Assigns a known object's burst to its category."""
+    learn: bool = True
+    """A known object's burst joins its category; False leaves what is known as it is."""
     seed: int = 0
 
 
@@ -61,7 +62,7 @@ class Agent:
         self._encoder = Encoder(backbone)
 
     def observe(self, burst: Burst, options: ObserveOptions | None = None, *, frame: str | None = None) -> Observation:
-        """Decides what `burst` shows; a known object gets a pose, a novel one a scan. The observation is kept.
+        """Decides what `burst` shows; a known object gets a pose and joins its category, a novel one gets a scan. The observation is kept.
 
         Raises NotFound for an unknown category, InvalidInput for an unknown variant, NoObject where nothing is seen.
         """
@@ -94,7 +95,7 @@ class Agent:
     def encoded(self, observation_id: str) -> EncodedBurst:
         """The encoded burst of an observation. Raises NotFound."""
         observations = self.memory.observations
-        return burst_from_arrays(observations.features(observation_id), observations.cameras(observation_id))
+        return burst_from_arrays(observations.features(observation_id))
 
     def begin_scan(self, source: Burst | str) -> Scan:
         """A scan of the object of a burst, or of an observation by its id.
@@ -154,7 +155,9 @@ def _pose_record(estimate: PoseEstimate, reference: Reference) -> Pose:
         reference.box.moved_by(estimate.target_from_reference),
         estimate.inliers,
         len(estimate.matches),
+        best_pair(estimate.pairs, estimate.matches)[1],
         estimate.residual_m,
+        estimate.score,
         estimate.confidence,
         tuple((alternative.target_from_reference, alternative.score) for alternative in estimate.alternatives),
     )

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
+from collections.abc import AsyncIterator, Iterator
+from contextlib import asynccontextmanager, contextmanager
 from importlib.metadata import version
 
-from anyio.to_thread import run_sync
 from fastapi import FastAPI
 
 from core.backbones.base import Backbone
@@ -34,9 +33,8 @@ def create_app(settings: Settings, *, backbone: Backbone | None = None) -> FastA
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
-        loaded = backbone if backbone is not None else await run_sync(lambda: _load_backbone(settings))
-        with await run_sync(lambda: Memory.open(settings.data_dir)) as memory:
-            app.state.agent = Agent(loaded, memory, agent_config(settings))
+        with open_agent(settings, backbone) as agent:
+            app.state.agent = agent
             app.state.lane = Lane()
             yield
 
@@ -56,8 +54,16 @@ def create_app(settings: Settings, *, backbone: Backbone | None = None) -> FastA
     return app
 
 
-def _load_backbone(settings: Settings) -> Backbone:
-    return load_backbone(settings.backbone, device=settings.device, report=log.info)
+@contextmanager
+def open_agent(settings: Settings, backbone: Backbone | None = None) -> Iterator[Agent]:
+    """The agent of these settings, with its memory open until the end; loads its backbone unless one is given.
+
+    Raises what `Memory.open`, `load_backbone` and `Agent` raise.
+    """
+    config = agent_config(settings)
+    with Memory.open(settings.data_dir) as memory:
+        loaded = backbone or load_backbone(settings.backbone, device=settings.device, report=log.info)
+        yield Agent(loaded, memory, config)
 
 
 def agent_config(settings: Settings) -> AgentConfig:

@@ -14,7 +14,7 @@ from core.errors import NotFound
 from core.views import View
 from service import pictures
 from service.agent import Agent
-from service.features import PoseDetails, pose_details_from_arrays
+from service.features import PoseDetails, best_pair, pose_details_from_arrays
 from service.pictures import ComponentColours, Picture
 
 
@@ -93,7 +93,7 @@ class ObservationGallery:
         return pictures.overlay_picture(view, view.camera, pose.box)
 
     def correspondences(self, index: int | None) -> Picture:
-        """Of one view and its best reference view; of the view with the most inliers where `index` is None.
+        """Of one view and its best reference view; of the pose's `best_view` where `index` is None.
 
         Raises NotFound also where there is no pose, or its category was deleted.
         """
@@ -129,9 +129,4 @@ def _pair(details: PoseDetails, index: int | None) -> tuple[int, int]:
     if not pairs:
         used = ", ".join(str(view) for view in sorted({target for _, target in details.pairs}))
         raise NotFound(f"the pose does not rest on view {index}; it rests on the views {used}")
-    matches = details.matches
-
-    def inliers(pair: tuple[int, int]) -> int:
-        return int((matches.inlier & (matches.reference_view == pair[0]) & (matches.target_view == pair[1])).sum())
-
-    return max(pairs, key=inliers)
+    return best_pair(pairs, details.matches)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from core.boxes import BOX_EDGES, OrientedBox
 from core.crop import Window
+from core.depth import complete
 from core.descriptors import PcaBasis
 from core.encode import EncodedView
 from core.views import Camera, View
@@ -64,11 +65,11 @@ def encode_png(picture: Picture) -> bytes:
 
 
 def depth_picture(depth_m: NDArray[np.float32]) -> Picture:
-    """Near is bright, far is dark, not measured is black."""
+    """Near is bright, far is dark; what was not measured is filled in at half brightness."""
     measured = depth_m > 0
     near, far = np.percentile(depth_m[measured], PERCENTILES)
-    picture = _colour_map((far - depth_m) / max(float(far - near), 1e-6))
-    picture[~measured] = 0
+    picture = _colour_map((far - complete(depth_m)) / max(float(far - near), 1e-6))
+    picture[~measured] //= 2
     return picture
 
 

@@ -28,7 +28,7 @@ class Settings(BaseSettings):
     device: str = Field("cpu", description="Torch device of the backbone: `cpu`, `cuda`, `cuda:1`.")
     score: str = Field(DEFAULT_SCORE, description="How similar two bursts are, for the decision.")
     threshold: float | None = Field(None, description="Least similarity of a known object; the score's own default where left out.")
-    variant: str = Field("ucd", description="Variant of the pose pipeline.")
+    variant: str = Field("best", description="Variant of the pose pipeline.")
     max_upload_mb: int = Field(128, gt=0, description="Largest request body, in megabytes of 1 000 000 bytes.")
     max_views: int = Field(32, gt=0, description="Most views in one burst.")
     scan_views: int = Field(10, ge=2, le=64, description="Viewpoints that a scan asks for.")

@@ -12,9 +12,9 @@ from sqlite_utils import Database
 from core.errors import NotFound
 from core.novelty import Decision
 from core.scan import ScanRequest
-from core.views import Burst, Camera, View
+from core.views import Burst, View
 from store.arrays import Array, read_arrays, write_arrays
-from store.bursts import read_cameras, read_view, write_burst
+from store.bursts import read_view, write_burst
 from store.connection import Connection, Row, new_id, now, only
 from store.records import Observation, Outcome, Pose, decision_from_json, decision_to_json, pose_from_json, pose_to_json
 from store.scans import insert_scan
@@ -86,11 +86,6 @@ class Observations:
         if row is None:
             raise NotFound(f"no observation has the id {observation_id!r}; GET /v1/observations lists them")
         return _observation(row)
-
-    def cameras(self, observation_id: str) -> list[Camera | None]:
-        """Its views' cameras. Raises NotFound."""
-        self.get(observation_id)
-        return read_cameras(self.folder(observation_id))
 
     def view(self, observation_id: str, index: int) -> View:
         """One of its views. Raises NotFound."""

@@ -62,7 +62,11 @@ class Pose:
     """The reference's box, moved to the target: its frame is `world_from_object`."""
     inliers: int
     correspondences: int
+    best_view: int
+    """The burst's view in which most correspondences agree."""
     residual_m: float
+    score: float | None
+    """Agreement of both objects' points, where the variant computes it; of the same kind as the alternatives' scores."""
     confidence: float | None
     alternatives: tuple[tuple[Sim3, float], ...]
     """Other transforms considered, best first, with their scores."""
@@ -131,7 +135,9 @@ def pose_to_json(pose: Pose) -> str:
             "box": {"world_from_object": pose.box.world_from_object.tolist(), "extent_m": pose.box.extent_m.tolist()},
             "inliers": pose.inliers,
             "correspondences": pose.correspondences,
+            "best_view": pose.best_view,
             "residual_m": pose.residual_m,
+            "score": pose.score,
             "confidence": pose.confidence,
             "alternatives": [[_sim3(transform), score] for transform, score in pose.alternatives],
         }
@@ -148,7 +154,9 @@ def pose_from_json(text: str) -> Pose:
         box,
         fields["inliers"],
         fields["correspondences"],
+        fields["best_view"],
         fields["residual_m"],
+        fields["score"],
         fields["confidence"],
         alternatives,
     )

@@ -1,15 +1,84 @@
-"""What every test may rely on: an environment without the user's settings, and examples that are the same on every run."""
+"""What every test may rely on: an environment without the user's settings, the same examples on every run, and a synthetic world.
+
+The world is made of ellipsoids whose colour says where on the object a point is, and its backbone reads colour: it is fast, and poses
+are known exactly.
+"""
 
 from __future__ import annotations
 
 import os
+from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, ClassVar
 
+import numpy as np
 import pytest
 from hypothesis import settings
 
+from core.backbones.base import Backbone, Features
+from core.sim3 import Sim3
+from core.views import Camera, View
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
 settings.register_profile("repeatable", derandomize=True, deadline=None, database=None)
 settings.load_profile("repeatable")
+
+
+class ColourBackbone:
+    """Tokens are random Fourier features of a patch's mean colour: near colours have near tokens; what is not black is foreground."""
+
+    name = "colour"
+    patch_size = 4
+    dim = 64
+    has_saliency = True
+    whitening = None
+    fingerprint = "colour-1"
+
+    def __init__(self) -> None:
+        rng = np.random.default_rng(0)
+        self._waves = rng.normal(scale=1 / 25, size=(3, self.dim))
+        self._phases = rng.uniform(0, 2 * np.pi, self.dim)
+        self.calls = 0
+
+    def extract(self, images: NDArray[np.uint8]) -> Features:
+        """See `Backbone.extract`; counts its calls."""
+        self.calls += 1
+        views, side = images.shape[:2]
+        grid = side // self.patch_size
+        patches = images.reshape(views, grid, self.patch_size, grid, self.patch_size, 3).mean(axis=(2, 4))
+        tokens = np.cos(patches @ self._waves + self._phases).astype(np.float32)
+        attention, saliency = ((each.max(axis=3) > 25).astype(np.float32) for each in (patches, images))
+        return Features(tokens, tokens.mean(axis=(1, 2)), attention, saliency)
+
+
+@dataclass(frozen=True, eq=False)
+class Ellipsoid:
+    """An object on a black background, each point coloured by its place on the object."""
+
+    half_axes: NDArray[np.floating]
+    """In the object frame, shape (3,)."""
+    colour: tuple[float, float] = (190, 60)
+    """Middle and amplitude."""
+    SIDE: ClassVar[int] = 160
+    """Of the images, pixels."""
+    K: ClassVar[NDArray[np.floating]] = np.array([[300.0, 0, 80], [0, 300, 80], [0, 0, 1]])
+
+    def view(self, world_from_object: Sim3, world_from_camera: NDArray[np.floating]) -> View:
+        """What a camera sees, with exact depth."""
+        camera = Camera(self.K, world_from_camera)
+        pixels = np.stack(np.meshgrid(np.arange(self.SIDE), np.arange(self.SIDE)), axis=-1).astype(float)
+        object_from_world = world_from_object.inverse()
+        origin = object_from_world.apply(world_from_camera[:3, 3]) / self.half_axes
+        ahead = object_from_world.apply(camera.back_project(pixels, np.ones(pixels.shape[:2]))) / self.half_axes - origin
+        a, b, c = (ahead**2).sum(-1), (ahead * origin).sum(-1), (origin**2).sum() - 1
+        root = b**2 - a * c
+        hit = root > 0
+        depth_m = np.where(hit, (-b - np.sqrt(np.maximum(root, 0))) / a, 0).astype(np.float32)
+        middle, amplitude = self.colour
+        shade = middle + amplitude * (origin + ahead * depth_m[..., None])
+        return View(np.where(hit[..., None], np.clip(shade, 0, 255), 0).astype(np.uint8), depth_m, camera)
 
 
 @pytest.fixture(autouse=True)
@@ -24,3 +93,23 @@ def no_user_settings(monkeypatch: pytest.MonkeyPatch) -> None:
 def samples() -> Path:
     """The repository's recordings: real images, in the data layout."""
     return Path(__file__).parent / "data" / "bursts"
+
+
+@pytest.fixture
+def backbone() -> ColourBackbone:
+    """A backbone that is there at once."""
+    return ColourBackbone()
+
+
+@pytest.fixture(scope="session")
+def ellipsoid() -> type[Ellipsoid]:
+    """The object of the synthetic world."""
+    return Ellipsoid
+
+
+@pytest.fixture(scope="session")
+def embedded_backbone() -> Backbone:
+    """The real one, loaded once for all tests."""
+    from core.backbones.dino import load_backbone
+
+    return load_backbone()

@@ -13,9 +13,6 @@ from typing import Annotated
 import typer
 
 from clients.cli.terminal import console
-from clients.errors import ClientError
-
-SAMPLES = Path(__file__).resolve().parents[2] / "tests" / "data" / "bursts"
 
 
 class WorldKind(str, Enum):
@@ -38,13 +35,15 @@ def simulate(
     `world` has one kind so far; it is named so that scripts keep working when there are more.
     """
     from clients.datasets.folders import find_sequences
+    from clients.datasets.samples import data_or_samples
     from clients.robot import RobotClient
     from clients.simulator.episode import Episode, summarise
     from clients.simulator.live import show, summary_table
     from clients.simulator.pictures import fetch_pictures
     from clients.simulator.report import EpisodeRecord, write_json, write_report
 
-    sequences = find_sequences(_data(data))
+    data = data_or_samples(data)
+    sequences = find_sequences(data)
     out.mkdir(parents=True, exist_ok=True)
     with _service(url, out / "service.log") as address, RobotClient(address) as robot:
         started = time.perf_counter()
@@ -53,7 +52,7 @@ def simulate(
         summary = summarise(encounters, time.perf_counter() - started)
         with console.status("drawing the report"):
             pictures = [fetch_pictures(robot, encounter) for encounter in encounters]
-        settings = {"world": world.value, "data": _data(data).name, "seed": seed, "views": views}
+        settings = {"world": world.value, "data": data.name, "seed": seed, "views": views}
         record = EpisodeRecord(summary, encounters, pictures, robot.categories(), robot.info(), settings)
     write_report(record, out / "report.html")
     write_json(record, out / "episode.json")
@@ -76,12 +75,6 @@ def samples(
     console.print(f"{len(names)} objects in {out}: {', '.join(names)}")
 
 
-def _data(data: Path | None) -> Path:
-    if data is None and not SAMPLES.is_dir():
-        raise ClientError(f"no sample bursts at {SAMPLES}; run from a clone of the repository, or name a folder of recordings with --data")
-    return data or SAMPLES
-
-
 @contextmanager
 def _service(url: str | None, log: Path) -> Iterator[str]:
     """The address of the service named, or of one started for the time being."""
@@ -91,8 +84,8 @@ def _service(url: str | None, log: Path) -> Iterator[str]:
     from clients.simulator.local_service import local_service
     from core.backbones.weights import embedded_weights
 
-    with console.status("looking for the backbone's weights") as status:
-        embedded_weights(report=status.update)
+    with console.status("looking for the backbone's weights"):
+        embedded_weights(report=console.print)
     with tempfile.TemporaryDirectory(prefix="onelook-") as memory:
         status = console.status("starting the service")
         status.start()

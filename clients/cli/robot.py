@@ -28,7 +28,7 @@ def observe(
     views: Views = None,
     category: Annotated[str | None, typer.Option(help="Take the object for one of this category (name or id).")] = None,
     threshold: Annotated[float | None, typer.Option(help="Least similarity of a known object.")] = None,
-    learn: Annotated[bool, typer.Option("--learn", help="Add a known object's views to its category.")] = False,
+    learn: Annotated[bool, typer.Option(help="Whether a known object's views join its category.")] = True,
     json: Json = False,
 ) -> None:
     """Ask what a recorded object is, and where and how turned."""

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+import contextlib
+import logging.config
+import socket
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from clients.cli.terminal import errors
-from core.errors import InvalidInput
+from core.errors import InvalidInput, Unavailable
+
+if TYPE_CHECKING:
+    from service.settings import Settings
+
+log = logging.getLogger("onelook")
 
 
 def serve(
@@ -20,22 +27,54 @@ def serve(
     threshold: Annotated[float | None, typer.Option(help="Least similarity of a known object; the score's own where left out.")] = None,
 ) -> None:
     """Start the service. Everything else is set by ONELOOK_* in the environment."""
-    import logging
-
     import uvicorn
-    from pydantic import ValidationError
 
-    from core.backbones.dino import load_backbone
-    from service.app import create_app
-    from service.settings import Settings
+    from service.app import create_app, open_agent
 
     given = {"host": host, "port": port, "data_dir": data_dir, "backbone": backbone, "device": device, "threshold": threshold}
+    settings = _settings({name: value for name, value in given.items() if value is not None})
+    logging.config.dictConfig(_log_config())
+    with _bound(settings.host, settings.port) as listener:
+        # Opened once before uvicorn starts, which would wrap the sentence that says what is wrong in a traceback.
+        with open_agent(settings) as agent:
+            loaded = agent.backbone
+        server = uvicorn.Server(uvicorn.Config(create_app(settings, backbone=loaded), log_config=None))
+        log.info("serving on http://%s:%d, memory in %s; Ctrl+C stops it", settings.host, listener.getsockname()[1], settings.data_dir)
+        with contextlib.suppress(KeyboardInterrupt):
+            server.run(sockets=[listener])
+
+
+def _settings(given: dict[str, object]) -> Settings:
+    """The options given, the environment for the rest. Raises InvalidInput."""
+    from pydantic import ValidationError
+
+    from service.settings import Settings
+
     try:
-        settings = Settings(**{name: value for name, value in given.items() if value is not None})  # type: ignore[arg-type]
+        return Settings(**given)  # type: ignore[arg-type]
     except ValidationError as error:
         first = error.errors()[0]
-        raise InvalidInput(".".join(str(part) for part in first["loc"]), f"{first['msg']}, found {first['input']!r}") from error
-    logging.basicConfig(level=logging.INFO, format="%(levelname)s %(name)s: %(message)s")
-    with errors.status("loading the backbone") as status:
-        loaded = load_backbone(settings.backbone, device=settings.device, report=status.update)
-    uvicorn.run(create_app(settings, backbone=loaded), host=settings.host, port=settings.port, log_level="info")
+        name = str(first["loc"][0])
+        field = f"--{name.replace('_', '-')}" if name in given else f"ONELOOK_{name.upper()}"
+        raise InvalidInput(field, f"{first['msg']}, found {first['input']!r}") from error
+
+
+def _log_config() -> dict[str, object]:
+    """Uvicorn's, with this service's own messages beside it on stderr."""
+    from uvicorn.config import LOGGING_CONFIG
+
+    own = {log.name: {"handlers": ["default"], "level": "INFO", "propagate": False}}
+    return LOGGING_CONFIG | {"loggers": LOGGING_CONFIG["loggers"] | own}
+
+
+def _bound(host: str, port: int) -> socket.socket:
+    """A socket that has the port but does not listen yet: nobody connects before the service can answer. Raises Unavailable."""
+    listener = socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET)
+    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        listener.bind((host, port))
+    except OSError as error:
+        listener.close()
+        remedy = "stop what uses it, or choose another one with --port (0 takes a free one) or --host"
+        raise Unavailable(f"cannot listen on {host}, port {port} ({error.strerror}); {remedy}") from error
+    return listener

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+from collections.abc import Iterator
 from collections.abc import Sequence as Indices
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,7 +15,12 @@ import numpy as np
 
 from core.errors import InvalidInput
 from core.sim3 import Sim3
-from core.views import Burst, Camera, FloatArray, View
+from core.views import Burst, Camera, FloatArray, View, require_rotation
+
+ABOUT = "sequence.json"
+"""The file that makes a folder a sequence."""
+SYMMETRY_SIDES = {9: 3, 16: 4}
+"""Rows of a symmetry's matrix, by how many numbers it has."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,11 +44,19 @@ class Sequence:
 
 
 def find_sequences(root: Path) -> list[Sequence]:
-    """Every sequence below `root`, sorted by path. Raises InvalidInput where there is none."""
-    folders = sorted(path.parent for path in root.rglob("sequence.json"))
+    """Every sequence below `root`, links followed, sorted by path. Raises InvalidInput where there is none."""
+    folders = sorted(_sequence_folders(root))
     if not folders:
-        raise InvalidInput("data", f"no sequence.json below {root}; expected CATEGORY/INSTANCE/sequence.json")
+        raise InvalidInput("data", f"no {ABOUT} below {root}; expected CATEGORY/INSTANCE/{ABOUT}")
     return [_read_sequence(folder) for folder in folders]
+
+
+def by_category(sequences: Indices[Sequence]) -> dict[str, list[Sequence]]:
+    """Sequences of each category, categories and instances sorted by name."""
+    grouped: dict[str, list[Sequence]] = {}
+    for sequence in sorted(sequences, key=lambda sequence: (sequence.category, sequence.instance)):
+        grouped.setdefault(sequence.category, []).append(sequence)
+    return grouped
 
 
 def load_burst(sequence: Sequence, indices: Indices[int] | None = None, *, masks: bool = False) -> Burst:
@@ -49,6 +64,20 @@ def load_burst(sequence: Sequence, indices: Indices[int] | None = None, *, masks
     cameras = _read_json(sequence.path / "scene_camera.json")
     chosen = range(len(sequence.images)) if indices is None else indices
     return Burst([_load_view(sequence, sequence.images[index], cameras, masks) for index in chosen])
+
+
+def _sequence_folders(root: Path) -> Iterator[Path]:
+    """Each folder once, however many links lead to it: one may even lead back up."""
+    seen: set[Path] = set()
+    for folder, inner, files in os.walk(root, followlinks=True):
+        inner.sort()
+        resolved = Path(folder).resolve()
+        if resolved in seen:
+            inner.clear()
+            continue
+        seen.add(resolved)
+        if ABOUT in files:
+            yield Path(folder)
 
 
 def _load_view(sequence: Sequence, image: Path, cameras: dict[str, Any], masks: bool) -> View:
@@ -75,10 +104,25 @@ def _read_camera(entry: dict[str, Any]) -> Camera:
 
 
 def _read_sequence(folder: Path) -> Sequence:
-    about = json.loads((folder / "sequence.json").read_text())
+    about = json.loads((folder / ABOUT).read_text())
     images = tuple(sorted(path for path in (folder / "rgb").iterdir() if path.suffix in {".jpg", ".png"}))
-    symmetries = tuple(np.array(matrix, dtype=float).reshape(-1)[:9].reshape(3, 3) for matrix in about.get("symmetries", ()))
+    listed = enumerate(about.get("symmetries") or ())
+    symmetries = tuple(_read_symmetry(matrix, f"{folder / ABOUT}: symmetries[{index}]") for index, matrix in listed)
     return Sequence(folder, about["category"], about["instance"], images, _world_from_model(folder, about), symmetries)
+
+
+def _read_symmetry(matrix: Any, field: str) -> FloatArray:
+    """A rotation, shape (3, 3), from 3×3 numbers, or from the 4×4 of BOP's `symmetries_discrete`; nested or row by row."""
+    try:
+        numbers = np.array(matrix, dtype=float).ravel()
+    except (TypeError, ValueError):  # rows of unequal length, or no numbers
+        numbers = np.empty(0)
+    if numbers.size not in SYMMETRY_SIDES or not np.isfinite(numbers).all():
+        raise InvalidInput(field, f"expected a rotation as 9 numbers (3×3) or a transform as 16 (4×4), row by row, found {matrix!r:.80}")
+    side = SYMMETRY_SIDES[numbers.size]
+    rotation = numbers.reshape(side, side)[:3, :3]
+    require_rotation(rotation, field)
+    return rotation
 
 
 def _world_from_model(folder: Path, about: dict[str, Any]) -> Sim3 | None:

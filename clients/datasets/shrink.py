@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from clients.datasets.folders import Sequence, find_sequences, load_burst
+from clients.datasets.folders import Sequence, by_category, find_sequences, load_burst
 from clients.datasets.viewpoints import spread
 from core.errors import InvalidInput
 from core.views import View
@@ -54,13 +54,11 @@ def shrink(data: Path, out: Path, config: ShrinkConfig, *, seed: int = 0) -> lis
 
 def draw(sequences: list[Sequence], config: ShrinkConfig, order: random.Random) -> list[Sequence]:
     """`instances` objects of each of `categories` categories that have as many, sorted by name."""
-    by_category: dict[str, list[Sequence]] = {}
-    for sequence in sequences:
-        by_category.setdefault(sequence.category, []).append(sequence)
-    enough = sorted(category for category, members in by_category.items() if len(members) >= config.instances)
+    groups = by_category(sequences)
+    enough = [category for category, members in groups.items() if len(members) >= config.instances]
     if len(enough) < config.categories:
         raise InvalidInput("data", f"{len(enough)} categories have {config.instances} objects or more; {config.categories} are asked for")
-    drawn = [order.sample(by_category[category], config.instances) for category in order.sample(enough, config.categories)]
+    drawn = [order.sample(groups[category], config.instances) for category in order.sample(enough, config.categories)]
     return sorted((member for members in drawn for member in members), key=lambda sequence: sequence.name)
 
 

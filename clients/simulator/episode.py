@@ -16,7 +16,7 @@ import numpy as np
 from clients.answers import Category
 from clients.datasets import folders
 from clients.errors import ClientError, ServiceProblem
-from clients.pose_error import PoseError, pose_error
+from clients.pose_error import NO_POSE, PoseError, accuracy, median, pose_error
 from clients.robot import Observation, RobotClient, Scan
 from clients.simulator.replay import ReplayWorld
 from core.views import Burst
@@ -89,7 +89,7 @@ class Episode:
         world = ReplayWorld(sequence)
         burst = world.glance(self._views, first=self._order.randrange(1 << 16))
         started = time.perf_counter()
-        seen = self._robot.observe(burst, learn=True, include="debug")
+        seen = self._robot.observe(burst)
         observe_ms = (time.perf_counter() - started) * 1e3
         founder = self._founders.get(seen.category_id or "")
         in_memory = any(each.category == sequence.category for each in self._founders.values())
@@ -165,7 +165,7 @@ class Summary:
     false_known: int
     undecided: int
     acc30: float | None
-    """Percentage of rightly recognised objects whose rotation is at most 30° off; one without a pose counts as wrong."""
+    """Percentage of rightly recognised objects with ground truth whose rotation is at most 30° off; one without a pose counts as wrong."""
     median_deg: float | None
     """Median rotation error of the poses of rightly recognised objects."""
     observe_ms: float
@@ -181,20 +181,21 @@ ACC_DEG = 30.0
 def summarise(encounters: Sequence[Encounter], total_s: float) -> Summary:
     """The figures of an episode that met at least one object."""
     count = {verdict: sum(each.verdict is verdict for each in encounters) for verdict in Verdict}
-    errors = [each.error.rotation_deg for each in encounters if each.error is not None]
+    errors = [each.error for each in encounters if each.error is not None]
+    recognised = [each for each in encounters if each.verdict is Verdict.RECOGNISED]
+    scored = [each.error or NO_POSE for each in recognised if each.sequence.world_from_model is not None]
     scans = [each.scan_ms for each in encounters if each.scan_ms is not None]
-    recognised = count[Verdict.RECOGNISED]
     return Summary(
         objects=len(encounters),
         kinds=len({each.sequence.category for each in encounters}),
         categories=sum(each.learnt is not None for each in encounters),
         met_again=sum(each.in_memory for each in encounters),
-        correct_known=recognised,
+        correct_known=len(recognised),
         false_novel=count[Verdict.FALSE_NOVEL],
         false_known=count[Verdict.FALSE_KNOWN],
         undecided=count[Verdict.UNDECIDED],
-        acc30=100 * sum(error <= ACC_DEG for error in errors) / recognised if recognised else None,
-        median_deg=float(np.median(errors)) if errors else None,
+        acc30=accuracy(scored, ACC_DEG) if scored else None,
+        median_deg=median(errors, "rotation_deg") if errors else None,
         observe_ms=float(np.median([each.observe_ms for each in encounters])),
         scan_ms=float(np.median(scans)) if scans else None,
         total_s=total_s,

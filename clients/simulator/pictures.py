@@ -28,13 +28,12 @@ class Pictures:
     """Data URIs of one encounter's pictures; None where there is none."""
 
     view: int
-    """Index in the burst."""
+    """Index in the burst of the view that they show."""
     rgb: str | None
     foreground: str | None
     pca: str | None
     overlay: str | None
     correspondences: str | None
-    """In the view where most agree with the pose; the other pictures are of `view`."""
     scanned: str | None
     """The views that a category was learnt from."""
 
@@ -55,18 +54,15 @@ def fetch_pictures(robot: RobotClient, encounter: Encounter) -> Pictures:
         foreground=fetch("foreground", CROP_SIDE, view=view),
         pca=fetch("pca", CROP_SIDE, view=view),
         overlay=fetch("overlay", CROP_SIDE, view=view),
-        correspondences=fetch("correspondences"),
+        correspondences=fetch("correspondences", view=view),
         scanned=_scanned(robot, encounter),
     )
 
 
 def shown_view(encounter: Encounter) -> int:
-    """The view of the burst that is most similar to a reference view, among those the pose rests on; the first where there is no pose."""
-    debug = encounter.observation.raw.get("debug")
-    if not debug or not debug["pairs"]:
-        return 0
-    _, view = max(debug["pairs"], key=lambda pair: debug["view_similarity"][pair[0]][pair[1]])
-    return int(view)
+    """The view in which most correspondences agree with the pose; the first where there is no pose."""
+    pose = encounter.observation.pose
+    return 0 if pose is None else pose.best_view
 
 
 def data_uri(png: bytes, side: int | None = None) -> str:

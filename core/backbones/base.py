@@ -11,6 +11,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from core.backbones.whitening import Whitening
+
 
 @dataclass(frozen=True, eq=False)
 class Features:
@@ -36,6 +38,8 @@ class Backbone(Protocol):
     """Token size D."""
     has_saliency: bool
     """Whether `Features.saliency` is given."""
+    whitening: Whitening | None
+    """Statistics of its patch tokens, where it has them."""
     fingerprint: str
     """Hash of weights, layer and preprocessing: tokens of different fingerprints cannot be compared."""
 

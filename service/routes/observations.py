@@ -27,7 +27,7 @@ ViewIndex = Annotated[int, Query(ge=0, description="Which of the burst's views, 
 
 @router.post("", status_code=201, responses=problems(404, 413, 415, 422, 503), openapi_extra={"requestBody": BURST_BODY})
 async def observe(upload: UploadDep, query: Annotated[ObserveQuery, Query()], agent: AgentDep, lane: LaneDep) -> Observation:
-    """Decides what a burst shows: a known object is answered with its pose, a novel one with a scan to carry out."""
+    """Decides what a burst shows: a known object is answered with its pose and joins its category, a novel one with a scan to carry out."""
     burst = _first_views(upload.burst, query.views_used)
     options = ObserveOptions(query.category_id, query.threshold, query.variant, query.learn, query.seed)
     debug = "debug" in query.include
@@ -74,9 +74,7 @@ def observation_overlay(observation_id: str, agent: AgentDep, view: ViewIndex = 
 def observation_correspondences(
     observation_id: str,
     agent: AgentDep,
-    view: Annotated[
-        int | None, Query(ge=0, description="Which of the burst's views; the one with the most inliers where left out.")
-    ] = None,
+    view: Annotated[int | None, Query(ge=0, description="Which of the burst's views; the pose's `best_view` where left out.")] = None,
 ) -> Response:
     """The best reference view (left) and a view of the burst (right): inliers coloured by similarity, other correspondences grey."""
     return png(ObservationGallery(agent, observation_id).correspondences(view))

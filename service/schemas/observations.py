@@ -23,7 +23,10 @@ class ObserveQuery(BaseModel):
     category_id: str | None = Field(None, description="Takes the object for one of this category and skips the decision.")
     threshold: float | None = Field(None, allow_inf_nan=False, description="Least similarity of a known object, for this request.")
     views_used: int | None = Field(None, ge=1, description="Uses only this many of the burst's views, the first ones.")
-    learn: bool = Field(False, description="Adds a known object's burst to its category, which later decisions then compare with.")
+    learn: bool = Field(
+        True,
+        description="A known object's burst joins its category, for later decisions; false leaves what is known as it is.",
+    )
     variant: str | None = Field(None, description="Variant of the pose pipeline, for this request.")
     seed: int = Field(0, ge=0, lt=2**31, description="Of the random choices in the pose pipeline; the same seed gives the same pose.")
     include: list[Literal["debug"]] = Field([], description="`debug` adds what the pose was computed from.", examples=[["debug"]])
@@ -41,7 +44,7 @@ class Alternative(BaseModel):
     """Another transform that was considered."""
 
     target_from_reference: Similarity
-    score: float = Field(description="Larger is better.")
+    score: float = Field(description="Larger is better; to be compared with the pose's `score`.")
 
 
 class Pose(BaseModel):
@@ -56,7 +59,9 @@ class Pose(BaseModel):
     box: Box
     inliers: int = Field(description="Correspondences that agree with the transform.", examples=[118])
     correspondences: int = Field(description="Correspondences it was fitted to.", examples=[250])
+    best_view: int = Field(description="Which of the burst's views has the most inliers, from 0; its pictures tell most.", examples=[2])
     residual_m: float = Field(description="Root mean square distance of the inliers after the transform, metres.", examples=[0.004])
+    score: float | None = Field(description="How well both objects agree after the transform, in [0, 1], where the variant computes it.")
     confidence: float | None = Field(description="Probability that the rotation is within 30°, where the variant estimates one.")
     alternatives: list[Alternative] = Field(description="Other transforms that were considered, best first.")
 
@@ -69,7 +74,9 @@ class Pose(BaseModel):
             box=Box.of(pose.box),
             inliers=pose.inliers,
             correspondences=pose.correspondences,
+            best_view=pose.best_view,
             residual_m=pose.residual_m,
+            score=pose.score,
             confidence=pose.confidence,
             alternatives=[
                 Alternative(target_from_reference=Similarity.of(transform), score=score) for transform, score in pose.alternatives

@@ -8,7 +8,10 @@ clients.cli                     starts any of them: the one place that may impor
 from __future__ import annotations
 
 import ast
+import re
+import sys
 from collections.abc import Iterator
+from importlib.metadata import requires
 from pathlib import Path
 
 import pytest
@@ -36,6 +39,8 @@ FOREIGN = {
     "benchmarks": WEB | DATABASE,
 }
 """Libraries that are another package's business."""
+DISTRIBUTIONS = {"PIL": "pillow", "cv2": "opencv-python-headless", "open3d": "open3d-cpu"}
+"""Of libraries that are imported under another name than they are installed."""
 FILE_CALLS = {
     "open",
     "imread",
@@ -111,6 +116,13 @@ def test_libraries_stay_where_they_belong(package: str) -> None:
         if name.split(".")[0] in FOREIGN[package] and not module_name(path).startswith(COMMANDS)
     ]
     assert not wrong
+
+
+@pytest.mark.parametrize("package", ALLOWED)
+def test_what_is_imported_is_a_direct_dependency(package: str) -> None:
+    declared = {re.split(r"[=;\[ ]", each)[0].lower() for each in requires("onelook") or () if "extra ==" not in each}
+    libraries = {name.split(".")[0] for path in modules(package) for name, _ in imports(path)} - {*ALLOWED, *sys.stdlib_module_names}
+    assert {DISTRIBUTIONS.get(each, each.replace("_", "-")) for each in libraries} <= declared
 
 
 def test_core_touches_no_files_but_weights() -> None:

@@ -9,9 +9,11 @@ import cv2
 import numpy as np
 
 import core
-from benchmarks.encoded import ARRAYS, SOURCES, encode_all, read_encoded
+from benchmarks.encoded import SOURCES, encode_all, read_encoded
 from clients.datasets.folders import find_sequences, load_burst
 from core.encode import Encoder, EncoderConfig
+
+ARRAYS = ("cells", "descriptors", "points_m", "saliency", "cls", "pooled")
 
 
 def test_what_is_read_is_what_was_encoded(recorded: Path, tmp_path: Path, backbone) -> None:
@@ -23,7 +25,7 @@ def test_what_is_read_is_what_was_encoded(recorded: Path, tmp_path: Path, backbo
     for ours, theirs in zip(read.views, fresh.views, strict=True):
         assert (ours.grid, ours.window) == (theirs.grid, theirs.window)
         for name in ARRAYS:
-            np.testing.assert_array_equal(getattr(ours, name), getattr(theirs, name))
+            np.testing.assert_allclose(getattr(ours, name), getattr(theirs, name), atol=2e-3)  # half precision
         np.testing.assert_array_equal(ours.camera.world_from_camera, theirs.camera.world_from_camera)
 
 

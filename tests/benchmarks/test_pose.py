@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import json
+import pickle
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from benchmarks import pose
-from benchmarks.accuracy import NO_POSE
+from benchmarks import parallel, pose
 from benchmarks.pairs import ViewCounts
 from clients.datasets.folders import find_sequences
-from clients.pose_error import PoseError
+from clients.pose_error import NO_POSE, PoseError
 from core.errors import InvalidInput, NoPose
 from core.pose import PoseConfig, PoseEstimator
 
@@ -25,9 +25,10 @@ COLUMNS = {
 
 @pytest.fixture(autouse=True)
 def small_world(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, backbone) -> None:
-    """The benchmark with the colour backbone and a cache of its own."""
+    """The benchmark with the colour backbone, a cache of its own, and in this process."""
     monkeypatch.setattr(pose, "load_backbone", lambda name: backbone)
     monkeypatch.setenv("ONELOOK_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setattr(parallel, "worker_count", lambda jobs: 1)  # a process of its own takes seconds to import torch
 
 
 def test_a_known_similarity_is_recovered(recorded: Path, tmp_path: Path) -> None:
@@ -47,6 +48,16 @@ def test_a_known_similarity_is_recovered(recorded: Path, tmp_path: Path) -> None
 def test_the_same_seed_gives_the_same_figures(recorded: Path) -> None:
     first, again = (pose.run(recorded, ["ucd"], ["3+2"], 1, None, seed=5)[0] for _ in range(2))
     assert replace(first, solve_ms=0) == replace(again, solve_ms=0)
+
+
+def test_a_job_and_its_result_can_travel_between_processes(recorded: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def travelled(function, jobs, *_: object) -> list[object]:
+        return [pickle.loads(pickle.dumps(function(pickle.loads(pickle.dumps(job))))) for job in jobs]
+
+    here = pose.run(recorded, ["ucd"], ["4"], 1, None)
+    monkeypatch.setattr(pose, "map_jobs", travelled)
+    there = pose.run(recorded, ["ucd"], ["4"], 1, None)
+    assert [replace(row, solve_ms=0) for row in there] == [replace(row, solve_ms=0) for row in here]
 
 
 def test_descriptor_sizes(recorded: Path) -> None:

@@ -33,6 +33,7 @@ class CentreBackbone:
     patch_size = 4
     dim = 48
     has_saliency = True
+    whitening = None
     fingerprint = "centre-1"
 
     def extract(self, images: NDArray[np.uint8]) -> Features:

@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner, Result
 
-from clients.cli import app, demo
+from clients.cli import app
+from clients.datasets import samples as shipped
 from clients.datasets.folders import Sequence
 from clients.errors import Unreachable
 from clients.simulator.local_service import local_service
@@ -39,6 +40,9 @@ def test_an_object_is_taught_named_recognised_and_forgotten(url: str, samples: l
     assert "bug" in onelook("categories", "--url", url).output
     seen = json.loads(onelook("observe", folder, "--json", "--url", url).output)
     assert (seen["outcome"], seen["name"]) == ("known", "bug")
+    assert onelook("observe", folder, "--no-learn", "--url", url).exit_code == 0
+    (joined,) = json.loads(onelook("categories", "list", "--json", "--url", url).output)
+    assert joined["instances"] == listed[0]["instances"] + 1
     assert "correspondences" in onelook("observe", folder, "--category", "bug", "--url", url).output
     assert onelook("categories", "rename", "bug", "beetle", "--url", url).exit_code == 0
     assert json.loads(onelook("memory", "--json", "--url", url).output)["categories"] == 1
@@ -75,7 +79,7 @@ def test_a_folder_of_many_objects_and_an_unknown_category_are_refused(url: str, 
 
 
 def test_missing_samples_are_said_to_be_missing(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(demo, "SAMPLES", tmp_path / "none")
+    monkeypatch.setattr(shipped, "SAMPLES", tmp_path / "none")
     failed = onelook("simulate")
     assert failed.exit_code == 1
     assert "--data" in failed.output
@@ -84,5 +88,5 @@ def test_missing_samples_are_said_to_be_missing(monkeypatch: pytest.MonkeyPatch,
 def test_a_service_that_cannot_start_shows_its_log(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("ONELOOK_PORT", "8000")
     monkeypatch.setenv("ONELOOK_MAX_VIEWS", "many")
-    with pytest.raises(Unreachable, match="(?s)stopped; its log .*max_views"), local_service(tmp_path / "memory", tmp_path / "log"):
+    with pytest.raises(Unreachable, match="(?s)stopped; its log .*ONELOOK_MAX_VIEWS"), local_service(tmp_path / "memory", tmp_path / "log"):
         pass

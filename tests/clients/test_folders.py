@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+import os
+import shutil
 from collections import Counter
 from pathlib import Path
 
@@ -65,3 +68,52 @@ def test_masks_are_given_only_when_asked_for(samples: list[Sequence]) -> None:
 def test_a_folder_without_sequences_is_named(tmp_path: Path) -> None:
     with pytest.raises(InvalidInput, match=r"sequence\.json"):
         find_sequences(tmp_path)
+
+
+QUARTER_TURN = [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
+BOP_QUARTER_TURN = [0.0, -1, 0, 5, 1, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]
+"""As `symmetries_discrete` of BOP's models_info.json: 4×4, row by row, with a translation in millimetres."""
+
+
+def with_symmetries(sequence: Sequence, folder: Path, symmetries: object) -> Path:
+    """A copy of a sample that says it has these symmetries."""
+    copy = shutil.copytree(sequence.path, folder / "copy")
+    about = json.loads((copy / "sequence.json").read_text())
+    (copy / "sequence.json").write_text(json.dumps(about | {"symmetries": symmetries}))
+    return copy
+
+
+@pytest.mark.parametrize(
+    "symmetry", [QUARTER_TURN, np.ravel(QUARTER_TURN).tolist(), BOP_QUARTER_TURN, np.reshape(BOP_QUARTER_TURN, (4, 4)).tolist()]
+)
+def test_a_symmetry_is_read_in_either_form(samples: list[Sequence], tmp_path: Path, symmetry: object) -> None:
+    (sequence,) = find_sequences(with_symmetries(samples[0], tmp_path, [symmetry]))
+    np.testing.assert_array_equal(sequence.symmetries, [QUARTER_TURN])
+
+
+@pytest.mark.parametrize(
+    ("symmetry", "says"),
+    [
+        ([1.0, 0.0, 0.0, 0.0], "expected a rotation as 9 numbers"),
+        ([[1.0, 0.0], [0.0]], "expected a rotation as 9 numbers"),
+        ("z", "expected a rotation as 9 numbers"),
+        ([None] * 9, "expected a rotation as 9 numbers"),
+        (np.ravel(2 * np.eye(3)).tolist(), "is not a rotation"),
+    ],
+)
+def test_a_symmetry_that_is_none_is_named(samples: list[Sequence], tmp_path: Path, symmetry: object, says: str) -> None:
+    folder = with_symmetries(samples[0], tmp_path, [QUARTER_TURN, symmetry])
+    with pytest.raises(InvalidInput, match=says) as caught:
+        find_sequences(folder)
+    assert caught.value.field == f"{folder / 'sequence.json'}: symmetries[1]"
+
+
+def test_linked_folders_are_followed_once(samples: list[Sequence], tmp_path: Path) -> None:
+    chosen = tmp_path / "chosen"
+    chosen.mkdir()
+    (chosen / "category").symlink_to(samples[0].path.parent, target_is_directory=True)
+    (chosen / "again").symlink_to(samples[0].path, target_is_directory=True)
+    (chosen / "up").symlink_to(os.pardir, target_is_directory=True)
+    found = find_sequences(chosen)
+    assert sorted(sequence.name for sequence in found) == [each.name for each in samples if each.category == samples[0].category]
+    assert all(load_burst(sequence, [0]).views for sequence in found)

@@ -1,4 +1,4 @@
-"""Scores of poses with known answers."""
+"""Scores of poses with known answers, and figures over many."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from clients.pose_error import pose_error
+from clients.pose_error import NO_POSE, PoseError, accuracy, median, pose_error
 from core.sim3 import Sim3
 
 REFERENCE = Sim3(0.4, Rotation.from_euler("xyz", [10, 70, -30], degrees=True).as_matrix(), np.array([0.3, -1.0, 2.0]))
@@ -43,3 +43,17 @@ def test_translation_is_a_fraction_of_the_diagonal_and_scale_a_logarithm() -> No
     assert pose_error(shifted, REFERENCE, TARGET).translation == pytest.approx(0.3 / 0.6)
     doubled = Sim3(2 * TARGET.scale, TARGET.rotation, TARGET.translation) @ REFERENCE.inverse()
     assert pose_error(doubled, REFERENCE, TARGET).log_scale == pytest.approx(np.log(2))
+
+
+EXACT = PoseError(0.0, 0.0, 0.0)
+
+
+def test_a_threshold_is_within_itself() -> None:
+    assert accuracy([PoseError(angle_deg, 0, 0) for angle_deg in (14.9, 15.0, 15.1, 90.0)], 15) == 50
+
+
+def test_a_refused_pose_counts_as_the_worst() -> None:
+    assert accuracy([EXACT, EXACT, EXACT, NO_POSE], 30) == 75
+    assert median([EXACT, NO_POSE, NO_POSE], "rotation_deg") == 180
+    assert median([EXACT, EXACT, NO_POSE], "translation") == 0
+    assert median([EXACT, NO_POSE], "translation") == np.inf

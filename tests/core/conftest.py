@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
+
 from core.crop import Window
 from core.encode import EncodedBurst, EncodedView
 from core.scan import hemisphere
 from core.sim3 import Sim3
 from core.views import Camera
-from scipy.spatial.transform import Rotation
 
 GRID = 28
 IMAGE = 224
@@ -47,6 +48,7 @@ class PaintedObject:
             self.descriptors[seen],
             world[seen].astype(np.float32),
             np.ones((GRID, GRID), np.float32),
+            self.descriptors[seen].mean(axis=0),
             self.descriptors[seen].mean(axis=0),
             camera,
         )

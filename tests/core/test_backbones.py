@@ -7,10 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from transformers import Dinov2Config, Dinov2Model, Dinov2WithRegistersConfig, Dinov2WithRegistersModel, ViTConfig, ViTModel
+
 from core.backbones import weights
 from core.backbones.dino import DinoBackbone, load_backbone
 from core.errors import Unavailable
-from transformers import Dinov2Config, Dinov2Model, Dinov2WithRegistersConfig, Dinov2WithRegistersModel, ViTConfig, ViTModel
 
 TINY = {"hidden_size": 24, "num_hidden_layers": 3, "num_attention_heads": 2, "intermediate_size": 48}
 IMAGES = np.random.default_rng(0).integers(0, 255, (3, 112, 112, 3)).astype(np.uint8)
@@ -22,7 +23,9 @@ def tiny_folder(kind: str, folder: Path) -> Path:
     models = {
         "dino": lambda: ViTModel(ViTConfig(**TINY, image_size=224, patch_size=8), add_pooling_layer=False),
         "dinov2": lambda: Dinov2Model(Dinov2Config(**TINY, image_size=70, patch_size=14)),
-        "registers": lambda: Dinov2WithRegistersModel(Dinov2WithRegistersConfig(**TINY, image_size=70, patch_size=14, num_register_tokens=4)),
+        "registers": lambda: Dinov2WithRegistersModel(
+            Dinov2WithRegistersConfig(**TINY, image_size=70, patch_size=14, num_register_tokens=4)
+        ),
     }
     models[kind]().save_pretrained(folder)
     return folder

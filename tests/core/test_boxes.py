@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+
 from core.boxes import BOX_EDGES, cloud_extent_m, oriented_box, remove_outliers
 from core.errors import NoObject
 from core.sim3 import Sim3

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+
 from core.correspond import PatchSet, match
 
 EYE = np.eye(4, dtype=np.float32)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+
 from core.crop import PADDING_RGB, Window, close_window, largest_component
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+
 from core.depth import SAMPLES, cell_depth, complete, reliable
 
 

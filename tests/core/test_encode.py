@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from clients.datasets.folders import Sequence, find_sequences, load_burst
 from core.backbones.dino import DinoBackbone, load_backbone
 from core.encode import EncodedBurst, Encoder, EncoderConfig

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+
 from core.foreground import fit_plane, otsu_threshold, vote_by_support
 
 

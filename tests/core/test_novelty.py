@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+
 from core.encode import EncodedBurst
 from core.errors import InvalidInput
 from core.novelty import SCORES, Member, best_view, decide, paper_mean, paper_sum
@@ -18,7 +19,7 @@ RNG = np.random.default_rng(0)
 
 def burst_of(painted: PaintedObject, tokens: np.ndarray) -> EncodedBurst:
     view = painted.encode(1, Sim3.identity()).views[0]
-    return EncodedBurst(tuple(replace(view, cls=token, descriptors=token[None]) for token in tokens.astype(np.float32)), "painted")
+    return EncodedBurst(tuple(replace(view, cls=token, pooled=token) for token in tokens.astype(np.float32)), "painted")
 
 
 def test_the_sum_over_pairs_is_the_product_of_sums() -> None:

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+
 from core.correspond import METHODS
 from core.encode import EncodedBurst
 from core.errors import InvalidInput, TooFewViews
@@ -44,7 +45,9 @@ def test_the_seed_decides_everything(painted: PaintedObject, moved: Sim3) -> Non
 
 def test_matches_point_at_patches_that_have_depth(painted: PaintedObject, moved: Sim3) -> None:
     target = painted.encode(3, moved)
-    blind = replace(target.views[0], points_m=np.where(np.arange(len(target.views[0].cells))[:, None] % 2, np.nan, target.views[0].points_m))
+    blind = replace(
+        target.views[0], points_m=np.where(np.arange(len(target.views[0].cells))[:, None] % 2, np.nan, target.views[0].points_m)
+    )
     target = EncodedBurst((blind, *target.views[1:]), target.fingerprint)
     matches = PoseEstimator().estimate(build_reference(painted.encode(6, Sim3.identity())), target).matches
     assert len(matches) > 20

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+
 from core.errors import NoPose
 from core.estimators.ransac import ransac
 from core.sim3 import Sim3

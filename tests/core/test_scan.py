@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+
 from core.errors import InvalidInput
 from core.scan import hemisphere, infer_up, look_at, nearest_view, request_scan
 from core.sim3 import Sim3

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from core.errors import InvalidInput, NoPose
-from core.sim3 import Sim3, rotation_angle_deg, umeyama
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
+
+from core.errors import InvalidInput, NoPose
+from core.sim3 import Sim3, rotation_angle_deg, umeyama
 
 numbers = st.floats(-5, 5)
 

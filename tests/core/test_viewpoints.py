@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from core.sim3 import Sim3, rotation_angle_deg
-from core.viewpoints import best_reference_per_target, consensus, mean_rotation, relative_rotations
 from scipy.spatial.transform import Rotation
+
+from core.sim3 import Sim3, rotation_angle_deg
+from core.viewpoints import best_reference_per_target, consensus, relative_rotations, view_agreement
 
 from .conftest import PaintedObject
 
@@ -39,5 +40,14 @@ def test_views_from_the_same_side_give_the_true_rotation(painted: PaintedObject,
     assert rotation_angle_deg(same_side, moved.rotation).max() < 3
 
 
-def test_mean_rotation() -> None:
-    assert rotation_angle_deg(mean_rotation(around_z(10, 30)), around_z(20)[0]) < 1e-4
+def test_a_rotation_that_joins_similar_views_agrees_more_than_others(painted: PaintedObject, moved: Sim3) -> None:
+    relative = relative_rotations(painted.encode(4, Sim3.identity()).views, painted.encode(4, moved).views)
+    half_turn = moved.rotation @ around_z(180)[0]
+    right, wrong = view_agreement(np.stack([moved.rotation, half_turn]), relative, np.eye(4) + 1, 30)
+    assert right > 1
+    assert wrong < 0
+
+
+def test_views_that_are_all_alike_say_nothing(painted: PaintedObject) -> None:
+    relative = relative_rotations(painted.encode(3, Sim3.identity()).views, painted.encode(2, Sim3.identity()).views)
+    assert np.allclose(view_agreement(around_z(0, 90), relative, np.ones((3, 2)), 30), 0)

@@ -1,7 +1,4 @@
-"""A service over ASGI on a synthetic world: ellipsoids whose colour says where on the object a point is, and a backbone that reads colour.
-
-The scene is exact, so poses are known; the backbone is fast, so every test drives the whole service.
-"""
+"""A service over ASGI on the synthetic world: its backbone is fast, so every test drives the whole service."""
 
 from __future__ import annotations
 
@@ -16,69 +13,27 @@ import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
-from core.backbones.base import Features
+from core.backbones.base import Backbone
 from core.scan import hemisphere
 from core.sim3 import Sim3
-from core.views import Burst, Camera, View
+from core.views import Burst
 from service.app import create_app
 from service.settings import Settings
 
-SIDE, FOCAL = 160, 300.0
 HALF_AXES_M = np.array([0.10, 0.07, 0.05])
 COLOURS = {"bright": (190, 60), "dark": (80, 40)}
-"""Middle and amplitude of the colours of two kinds of object, on a black background."""
-
-
-class ColourBackbone:
-    """Tokens are random Fourier features of a patch's mean colour: near colours have near tokens."""
-
-    name = "colour"
-    patch_size = 4
-    dim = 64
-    has_saliency = True
-    fingerprint = "colour-1"
-
-    def __init__(self) -> None:
-        rng = np.random.default_rng(0)
-        self._waves = rng.normal(scale=1 / 25, size=(3, self.dim))
-        self._phases = rng.uniform(0, 2 * np.pi, self.dim)
-
-    def extract(self, images: np.ndarray) -> Features:
-        """See `Backbone.extract`."""
-        views, side = images.shape[:2]
-        grid = side // self.patch_size
-        patches = images.reshape(views, grid, self.patch_size, grid, self.patch_size, 3).mean(axis=(2, 4))
-        tokens = np.cos(patches @ self._waves + self._phases).astype(np.float32)
-        saliency = (images.max(axis=3) > 25).astype(np.float32)
-        attention = (patches.max(axis=3) > 25).astype(np.float32)
-        return Features(tokens, tokens.mean(axis=(1, 2)), attention, saliency)
-
-
-def render(kind: str, world_from_object: Sim3, camera: Camera) -> View:
-    """An ellipsoid, each point coloured by its place on the object, with exact depth."""
-    middle, amplitude = COLOURS[kind]
-    pixels = np.stack(np.meshgrid(np.arange(SIDE), np.arange(SIDE)), axis=-1).astype(float)
-    object_from_world = world_from_object.inverse()
-    origin = object_from_world.apply(camera.world_from_camera[:3, 3]) / HALF_AXES_M
-    ahead = object_from_world.apply(camera.back_project(pixels, np.ones((SIDE, SIDE)))) / HALF_AXES_M - origin
-    a, b, c = (ahead**2).sum(-1), (ahead * origin).sum(-1), (origin**2).sum() - 1
-    root = b**2 - a * c
-    hit = root > 0
-    depth_m = np.where(hit, (-b - np.sqrt(np.maximum(root, 0))) / a, 0).astype(np.float32)
-    colour = middle + amplitude * (origin + ahead * depth_m[..., None])
-    rgb = np.where(hit[..., None], np.clip(colour, 0, 255), 0).astype(np.uint8)
-    return View(rgb, depth_m, camera)
+"""Middle and amplitude of the colours of two kinds of object."""
 
 
 @pytest.fixture(scope="session")
-def look() -> Callable[..., Burst]:
+def look(ellipsoid: Any) -> Callable[..., Burst]:
     """look(kind, views=…, world_from_object=…): a burst around an object."""
 
     def burst(kind: str = "bright", views: int = 6, world_from_object: Sim3 | None = None) -> Burst:
         placed = world_from_object or Sim3.identity()
-        K = np.array([[FOCAL, 0, SIDE / 2], [0, FOCAL, SIDE / 2], [0, 0, 1]])
         poses = hemisphere(placed.translation, np.array([0.0, 0.0, 1.0]), 0.5 * placed.scale, views)
-        return Burst([render(kind, placed, Camera(K, pose)) for pose in poses])
+        shown = ellipsoid(HALF_AXES_M, COLOURS[kind])
+        return Burst([shown.view(placed, pose) for pose in poses])
 
     return burst
 
@@ -133,14 +88,8 @@ def settings(tmp_path: Path) -> Settings:
     return Settings(data_dir=tmp_path / "memory", max_views=12, max_upload_mb=8)
 
 
-@pytest.fixture(scope="session")
-def backbone() -> ColourBackbone:
-    """The one backbone of these tests."""
-    return ColourBackbone()
-
-
 @pytest.fixture
-def client(settings: Settings, backbone: ColourBackbone) -> Iterator[TestClient]:
+def client(settings: Settings, backbone: Backbone) -> Iterator[TestClient]:
     """The service, started."""
     with TestClient(create_app(settings, backbone=backbone)) as opened:
         yield opened

@@ -32,14 +32,15 @@ def test_look_scan_know(agent, look):
 
 
 def test_an_answer_is_the_same_after_reopening(tmp_path, backbone, look):
+    asked = look("bright", views=3), ObserveOptions(learn=False)
     with Memory.open(tmp_path / "memory") as memory:
         agent = Agent(backbone, memory, CONFIG)
         scan = agent.begin_scan(look())
         agent.add_views(scan.id, look())
         agent.complete_scan(scan.id)
-        before = agent.observe(look("bright", views=3))
+        before = agent.observe(*asked)
     with Memory.open(tmp_path / "memory") as memory:
-        after = Agent(backbone, memory, CONFIG).observe(look("bright", views=3))
+        after = Agent(backbone, memory, CONFIG).observe(*asked)
     assert after.decision.similarities == before.decision.similarities
     assert np.array_equal(after.pose.target_from_reference.as_matrix(), before.pose.target_from_reference.as_matrix())
 
@@ -54,7 +55,7 @@ def test_an_observation_s_tokens_are_kept_for_a_later_scan(agent, look):
 
 def test_an_unknown_variant_is_refused_before_anything_is_computed(agent, look):
     with pytest.raises(InvalidInput, match="variant"):
-        agent.observe(look(), ObserveOptions(variant="best"))
+        agent.observe(look(), ObserveOptions(variant="nonsense"))
     assert agent.memory.observations.latest(1) == []
 
 

@@ -68,14 +68,27 @@ def test_only_the_first_views_are_used(client, look, parts):
     assert answer["views"] == 2
 
 
-def test_learning_is_only_on_request(client, look, parts, learn):
+def test_a_known_object_joins_its_category(client, look, parts, learn):
     category = learn()
+    seen = client.post("/v1/observations", files=parts(look(views=3))).json()
+    assert client.get(f"/v1/categories/{category['id']}").json()["instances"] == 2
+    joined = client.app.state.agent.memory.categories.members()[-1]
+    assert (joined.category_id, len(joined.cls)) == (seen["category_id"], 3)
 
-    def instances_after(**params):
-        client.post("/v1/observations", files=parts(look()), params=params)
-        return client.get(f"/v1/categories/{category['id']}").json()["instances"]
 
-    assert [instances_after(), instances_after(learn=True)] == [1, 2]
+def test_without_learning_what_is_known_stays_as_it_is(client, look, parts, learn):
+    category = learn()
+    asked = {"files": parts(look(views=3)), "params": {"learn": False}}
+    first, again = (client.post("/v1/observations", **asked).json() for _ in range(2))
+    assert first["outcome"] == again["outcome"] == "known"
+    assert first["similarities"] == again["similarities"]
+    assert client.get("/v1/categories").json() == {"categories": [category]}
+
+
+def test_a_novel_object_joins_nothing(client, look, parts, learn):
+    category = learn("bright")
+    assert client.post("/v1/observations", files=parts(look("dark"))).json()["outcome"] == "novel"
+    assert client.get("/v1/categories").json() == {"categories": [category]}
 
 
 def test_a_view_comes_back_as_it_was_sent(client, look, seen):
@@ -99,6 +112,15 @@ def test_correspondences_join_two_crops(client, seen):
     assert shown.shape == (448, 2 * 448 + 16, 3)
     gap = shown[:, 448:464]
     assert (gap.min(axis=2) < 200).any()
+
+
+def test_the_best_view_is_where_most_correspondences_agree(client, seen):
+    arrays = client.app.state.agent.memory.observations.features(seen["id"])
+    inliers = np.bincount(arrays["match_target_view"][arrays["match_inlier"]], minlength=4)
+    assert inliers[seen["pose"]["best_view"]] == inliers.max()
+    path = f"/v1/observations/{seen['id']}/correspondences.png"
+    named = picture(client.get(path, params={"view": seen["pose"]["best_view"]}))
+    assert np.array_equal(picture(client.get(path)), named)
 
 
 def test_correspondences_of_a_view_that_the_pose_does_not_rest_on(client, seen):

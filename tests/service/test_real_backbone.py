@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,26 +10,29 @@ from fastapi.testclient import TestClient
 from scipy.spatial.transform import Rotation
 
 from clients.datasets.folders import find_sequences, load_burst
-from core.backbones.dino import load_backbone
 from core.sim3 import Sim3, rotation_angle_deg
 from core.views import Burst, Camera
 from service.app import create_app
 
-BURSTS = Path(__file__).parents[1] / "data" / "bursts"
 MOVED = Sim3(1.2, Rotation.from_rotvec([0.5, -0.8, 0.3]).as_matrix(), np.array([0.3, 0.1, -0.4]))
 
 
 @pytest.fixture
-def service(settings):
+def service(settings, embedded_backbone):
     """The service with its real backbone."""
-    with TestClient(create_app(settings, backbone=load_backbone())) as client:
+    with TestClient(create_app(settings, backbone=embedded_backbone)) as client:
         yield client
 
 
-def recorded(name, indices):
-    """Views of a sample."""
-    (sequence,) = [each for each in find_sequences(BURSTS) if each.name == name]
-    return load_burst(sequence, indices)
+@pytest.fixture
+def recorded(samples):
+    """recorded(name, indices): views of a sample."""
+
+    def views(name, indices):
+        (sequence,) = find_sequences(samples / name)
+        return load_burst(sequence, indices)
+
+    return views
 
 
 def moved(burst):
@@ -45,7 +47,7 @@ def moved(burst):
     return Burst([view(each) for each in burst.views])
 
 
-def test_learn_one_know_it_elsewhere_tell_another_apart(service, parts):
+def test_learn_one_know_it_elsewhere_tell_another_apart(service, parts, recorded):
     scanned = recorded("tv/tv_1", range(0, 12, 3))
     novel = service.post("/v1/observations", files=parts(scanned.select([0, 2]))).json()
     assert novel["outcome"] == "novel"

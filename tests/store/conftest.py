@@ -64,6 +64,7 @@ def encoded(burst: Burst) -> EncodedBurst:
             points_m=rng.normal(size=(PATCHES, 3)).astype(np.float32),
             saliency=rng.random((4, 4), dtype=np.float32),
             cls=rng.normal(size=DIM).astype(np.float32),
+            pooled=rng.normal(size=DIM).astype(np.float32),
             camera=camera,
         )
 

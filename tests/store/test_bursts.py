@@ -10,7 +10,7 @@ import pytest
 
 from core.errors import Unavailable
 from core.views import Burst, View
-from store.bursts import read_burst, read_cameras, read_view, write_burst
+from store.bursts import read_burst, read_view, write_burst
 
 
 def test_colour_cameras_and_masks_come_back_exactly(tmp_path: Path, burst: Burst) -> None:
@@ -38,13 +38,6 @@ def test_a_view_of_colour_alone_comes_back_as_such(tmp_path: Path, burst: Burst)
     write_burst(tmp_path, Burst([View(burst.views[0].rgb)]))
     found = read_view(tmp_path, 0)
     assert (found.depth_m, found.camera, found.mask) == (None, None, None)
-
-
-def test_cameras_are_read_without_images(tmp_path: Path, burst: Burst) -> None:
-    write_burst(tmp_path, burst)
-    for path in tmp_path.glob("*.png"):
-        path.unlink()
-    assert np.array_equal(read_cameras(tmp_path)[1].K, burst.views[1].camera.K)
 
 
 def test_a_missing_image_is_named(tmp_path: Path, burst: Burst) -> None:

@@ -27,7 +27,7 @@ NOVEL = Answer("novel", None, "map", Decision("novel", "paper_mean", 0.4, (("x",
 def known(category_id: str) -> Answer:
     """An answer with everything a pose has."""
     turn = Sim3(0.7, Rotation.from_rotvec([0.1, 0.2, 0.3]).as_matrix(), np.array([1.0, 2, 3]))
-    pose = Pose(turn, OrientedBox(np.eye(4), np.ones(3)), 10, 20, 0.01, None, ((turn, 0.5),))
+    pose = Pose(turn, OrientedBox(np.eye(4), np.ones(3)), 10, 20, 3, 0.01, 0.7, None, ((turn, 0.5),))
     return replace(NOVEL, outcome="known", category_id=category_id, pose=pose)
 
 
@@ -42,7 +42,8 @@ def test_a_pose_comes_back_exactly(memory: Memory, reference: Reference, burst: 
     pose = memory.observations.create(answer, burst, FEATURES).pose
     assert np.array_equal(pose.target_from_reference.as_matrix(), answer.pose.target_from_reference.as_matrix())
     assert np.array_equal(pose.alternatives[0][0].as_matrix(), answer.pose.alternatives[0][0].as_matrix())
-    assert (pose.inliers, pose.correspondences, pose.residual_m, pose.confidence) == (10, 20, 0.01, None)
+    assert (pose.inliers, pose.correspondences, pose.best_view) == (10, 20, 3)
+    assert (pose.residual_m, pose.score, pose.confidence) == (0.01, 0.7, None)
 
 
 def test_views_and_features_come_back(memory: Memory, burst: Burst) -> None:

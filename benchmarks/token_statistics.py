@@ -1,0 +1,41 @@
+"""Makes the token statistics that ship with the embedded backbone: `python -m benchmarks.token_statistics --data DIR`.
+
+Mean and covariance of patch tokens, object and background alike, over every close crop of every burst below DIR. No label is used.
+The shipped file is made from the sample bursts.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+from rich.progress import track
+
+from clients.datasets.folders import find_sequences, load_burst
+from core.backbones.dino import EMBEDDED, load_backbone
+from core.backbones.whitening import STATISTICS, Whitening
+from core.encode import Encoder
+
+PATCHES_A_VIEW = 200
+
+
+def main(data: Annotated[Path, typer.Option(help="folder of bursts")], out: Annotated[Path, typer.Option()] = STATISTICS) -> None:
+    """Writes the statistics of the embedded backbone's patch tokens."""
+    backbone = load_backbone(report=typer.echo)
+    encoder = Encoder(backbone)
+    rng = np.random.default_rng(0)
+    tokens = []
+    for sequence in track(find_sequences(data), "encoding"):
+        burst = load_burst(sequence)
+        windows = [view.window for view in encoder.encode(burst).views]
+        side = encoder.config.grid * backbone.patch_size
+        crops = np.stack([window.cut(view.rgb, side) for view, window in zip(burst.views, windows)])
+        patches = backbone.extract(crops).patches.reshape(len(crops), -1, backbone.dim)
+        tokens += [view[rng.permutation(len(view))[:PATCHES_A_VIEW]] for view in patches]
+    typer.echo(f"wrote {Whitening.fit(np.concatenate(tokens)).save(EMBEDDED, out)}")
+
+
+if __name__ == "__main__":
+    typer.run(main)

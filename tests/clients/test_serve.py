@@ -1,0 +1,99 @@
+"""`onelook serve`: it tells what it waits for, and what keeps it from starting in one sentence with the remedy."""
+
+from __future__ import annotations
+
+import logging
+import socket
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+import uvicorn
+from typer.testing import CliRunner, Result
+
+import service.app
+from clients.cli import app
+from core.errors import Unavailable
+from store.memory import Memory
+
+
+class Loaded:
+    """What a memory is tied to."""
+
+    name, fingerprint = "centre", "centre-1"
+
+
+@pytest.fixture(autouse=True)
+def loading(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """A backbone that is there at once, no server, and the loggers as they were."""
+    monkeypatch.setattr(service.app, "load_backbone", lambda name, device, report: Loaded())
+    monkeypatch.setattr(uvicorn.Server, "run", lambda server, sockets: None)
+    yield
+    for name in ("onelook", "uvicorn", "uvicorn.access"):
+        logging.getLogger(name).handlers.clear()
+
+
+@pytest.fixture
+def serve(tmp_path: Path) -> Callable[..., Result]:
+    """serve(*options): `onelook serve` on a free port with a memory in a temporary folder."""
+
+    def run(*options: object) -> Result:
+        words = ["serve", "--port", 0, "--data-dir", tmp_path / "memory", *options]
+        return CliRunner().invoke(app, [str(word) for word in words])
+
+    return run
+
+
+def refused(result: Result, *words: str) -> None:
+    """Asserts one sentence on stderr that has all `words`."""
+    assert result.exit_code == 1, result.output
+    (sentence,) = [line for line in result.stderr.splitlines() if not line.startswith("INFO")]
+    assert sentence.startswith("error: ")
+    for word in words:
+        assert word in sentence
+
+
+def test_it_says_where_it_serves(serve: Callable[..., Result], tmp_path: Path) -> None:
+    started = serve()
+    assert started.exit_code == 0, started.output
+    assert "serving on http://127.0.0.1:" in started.stderr
+    assert str(tmp_path / "memory") in started.stderr
+
+
+def test_the_first_start_tells_of_the_download(serve: Callable[..., Result], monkeypatch: pytest.MonkeyPatch) -> None:
+    def fetch(name: str, device: str, report: Callable[[str], None]) -> None:
+        report("fetching the weights (90 MB)")
+        raise Unavailable("could not fetch the weights; check the network")
+
+    monkeypatch.setattr(service.app, "load_backbone", fetch)
+    failed = serve()
+    assert "fetching the weights (90 MB)" in failed.stderr
+    refused(failed, "check the network")
+
+
+def test_a_memory_of_another_backbone(serve: Callable[..., Result], tmp_path: Path) -> None:
+    with Memory.open(tmp_path / "memory") as memory:
+        memory.require_backbone("other", "other-1")
+    refused(serve(), "other-1", "centre-1", "ONELOOK_BACKBONE", "ONELOOK_DATA_DIR")
+
+
+def test_a_memory_that_another_process_has_open(serve: Callable[..., Result], tmp_path: Path) -> None:
+    with Memory.open(tmp_path / "memory"):
+        refused(serve(), "open in another process", "ONELOOK_DATA_DIR")
+
+
+def test_a_memory_that_cannot_be_written(serve: Callable[..., Result], tmp_path: Path) -> None:
+    (tmp_path / "memory").write_text("a file, not a folder")
+    refused(serve(), "cannot open the memory", "ONELOOK_DATA_DIR")
+
+
+def test_a_used_port(serve: Callable[..., Result]) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as other:
+        port = other.getsockname()[1]
+        refused(serve("--port", port), f"port {port}", "--port", "0 takes a free one")
+
+
+def test_a_wrong_setting(serve: Callable[..., Result], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ONELOOK_MAX_VIEWS", "many")
+    refused(serve(), "ONELOOK_MAX_VIEWS", "'many'")
+    refused(serve("--port", 70_000), "--port", "70000")
