@@ -68,15 +68,20 @@ def inliers(points: FloatArray) -> NDArray[np.intp]:
 
 
 def oriented_box(points: FloatArray) -> OrientedBox:
-    """The box along the principal axes of the convex hull of points, shape (N, 3); thin for a flat object. Raises NoObject for too few."""
+    """The smallest box around the convex hull of points, shape (N, 3); thin for a flat object. Raises NoObject for too few.
+
+    The appendix takes the box along the hull's principal axes as a fast approximation of this one; it is off the object's own axes
+    by several times the angle, since no view shows the underside.
+    """
     if len(points) < MIN_POINTS:
         raise NoObject(
-            "views", f"only {len(points)} object points have measured depth; at least {MIN_POINTS} are needed: check the depth images"
+            "views",
+            f"only {len(points)} object points have measured depth; at least {MIN_POINTS} are needed: check the depth images",
         )
     cloud = _cloud(points)
     try:
-        box = cloud.get_oriented_bounding_box()
-    except RuntimeError:  # all in one plane: the hull needs Qhull's joggled input
+        box = cloud.get_minimal_oriented_bounding_box()
+    except RuntimeError:  # all in one plane: the hull needs joggled input, of which the smallest box fails
         box = cloud.get_oriented_bounding_box(robust=True)
     axes = np.asarray(box.R)
     if np.linalg.det(axes) < 0:

@@ -133,7 +133,7 @@ class View:
             if max(abs(cx / width - 0.5), abs(cy / height - 0.5)) > 0.2:
                 raise InvalidInput(
                     f"{field}.K",
-                    f"its principal point ({cx:.0f}, {cy:.0f}) is far from the centre of the {width}×{height} image: K is of another resolution",
+                    f"its principal point ({cx:.0f}, {cy:.0f}) is far from the centre of the {width}×{height} image: K is of another size",
                 )
         self._validate_depth(field)
         if self.mask is not None:

@@ -1,0 +1,87 @@
+"""The dense score prefers the truth, and refinement finds it from nearby."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+from scipy.spatial.transform import Rotation
+
+from core.dense import DenseAgreement, DenseConfig
+from core.descriptors import unit
+from core.encode import EncodedBurst
+from core.errors import NoPose
+from core.estimators.batched import Sim3Batch, umeyama_batch
+from core.hypotheses import distinct
+from core.pose import VARIANTS, PoseEstimator
+from core.reference import build_reference
+from core.sim3 import Sim3, rotation_angle_deg
+
+from .conftest import PaintedObject
+
+
+def batch(*transforms: Sim3) -> Sim3Batch:
+    return Sim3Batch(
+        torch.tensor([each.scale for each in transforms]).float(),
+        torch.from_numpy(np.stack([each.rotation for each in transforms])).float(),
+        torch.from_numpy(np.stack([each.translation for each in transforms])).float(),
+    )
+
+
+def turned(degrees: float) -> Sim3:
+    return Sim3(1.0, Rotation.from_euler("z", degrees, degrees=True).as_matrix(), np.zeros(3))
+
+
+@pytest.fixture
+def agreement(painted: PaintedObject, moved: Sim3) -> DenseAgreement:
+    sides = [painted.encode(5, Sim3.identity()).views, painted.encode(4, moved).views]
+    described = [[unit(view.descriptors) for view in views] for views in sides]
+    return DenseAgreement(sides[0], sides[1], (described[0], described[1]), DenseConfig(), seed=0)
+
+
+def test_the_truth_scores_above_turns_of_it(agreement: DenseAgreement, moved: Sim3) -> None:
+    scores = agreement.score(batch(moved, moved @ turned(20), moved @ turned(180)))
+    assert scores.argmax() == 0
+    assert scores.min() >= 0
+    assert scores.max() <= 1
+
+
+def test_refinement_ends_nearer_the_truth(agreement: DenseAgreement, moved: Sim3) -> None:
+    start = moved @ turned(12)
+    refined = agreement.refine(batch(start))[0]
+    assert rotation_angle_deg(refined.rotation, moved.rotation) < 3
+
+
+def test_distinct_keeps_the_better_of_two_alike() -> None:
+    transforms = batch(turned(0), turned(5), turned(90), turned(180))
+    assert distinct(transforms, torch.tensor([0.4, 0.5, 0.1, 0.3]), 12, 3) == [1, 3, 2]
+
+
+def test_a_batch_of_fits_is_each_fit_alone(moved: Sim3) -> None:
+    points = torch.from_numpy(np.random.default_rng(0).normal(size=(3, 5, 3)))
+    aims = torch.from_numpy(np.stack([moved.apply(each.numpy()) for each in points]))
+    aims[2] = points[2, :1]
+    fitted, determined = umeyama_batch(points, aims)
+    assert determined.tolist() == [True, True, False]
+    assert np.allclose(fitted[1].as_matrix(), moved.as_matrix())
+
+
+def test_an_object_that_looks_the_same_from_behind_has_a_rival(painted: PaintedObject, moved: Sim3) -> None:
+    painted.points = np.concatenate([painted.points, turned(180).apply(painted.points)])
+    painted.descriptors = np.concatenate([painted.descriptors, painted.descriptors])
+    estimate = PoseEstimator(VARIANTS["best"]).estimate(build_reference(painted.encode(6, Sim3.identity())), painted.encode(4, moved))
+    rival = estimate.alternatives[0]
+    assert estimate.score is not None
+    assert estimate.score * 0.8 < rival.score <= estimate.score
+    assert rotation_angle_deg(rival.target_from_reference.rotation, estimate.target_from_reference.rotation) > 170
+
+
+def test_best_without_a_match_is_no_pose(painted: PaintedObject) -> None:
+    target = painted.encode(2, Sim3.identity())
+    opposite = EncodedBurst(tuple(replace(view, descriptors=np.zeros_like(view.descriptors)) for view in target.views), target.fingerprint)
+    reference = build_reference(painted.encode(4, Sim3.identity()))
+    zero_mean = replace(reference.basis, mean=np.zeros_like(reference.basis.mean))
+    with pytest.raises(NoPose, match="no view pair"):
+        PoseEstimator(VARIANTS["best"]).estimate(replace(reference, basis=zero_mean), opposite)
