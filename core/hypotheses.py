@@ -75,9 +75,9 @@ def propose(
 
     batches = [fit([pair for pair in best_reference_per_target(similarity) if similarity[pair] > 0], config.pooled_trials, config.pooled)]
     batches += [fit([pair], config.single_trials, 1) for pair in ranked[: config.single_pairs]]
-    for cluster in _clusters(ranked[: config.clustered_pairs], rotations, config, seed):
+    for cluster in _clusters(ranked[: config.clustered_pairs], rotations, similarity, config, seed):
         batches.append(fit(cluster, config.cluster_trials, config.per_cluster))
-    batches.append(_aligned([rotations[pair] for pair in ranked[: config.aligned_pairs]], clouds, size_ratio))
+    batches.append(align_clouds(np.stack([rotations[pair] for pair in ranked[: config.aligned_pairs]]), clouds[0], clouds[1]))
     together = Sim3Batch.concatenate(batches)
     off = together.scale / size_ratio
     return together.select(((off < config.max_scale_ratio) & (off > 1 / config.max_scale_ratio)).nonzero().flatten())
@@ -109,11 +109,12 @@ def _best_samples(source: FloatArray, target: FloatArray, threshold_m: float, tr
     return Sim3Batch(fitted.scale.float(), fitted.rotation.float(), fitted.translation.float())
 
 
-def _clusters(pairs: Pairs, rotations: FloatArray, config: HypothesesConfig, seed: int) -> list[Pairs]:
+def _clusters(pairs: Pairs, rotations: FloatArray, similarity: FloatArray, config: HypothesesConfig, seed: int) -> list[Pairs]:
     """Largest agreeing set, then the largest of the rest, and so on."""
     clusters: list[Pairs] = []
     while pairs and len(clusters) < config.clusters:
-        agree = consensus(np.stack([rotations[pair] for pair in pairs]), config.cluster_deg, seed)
+        of_pairs = [np.stack([each[pair] for pair in pairs]) for each in (rotations, similarity)]
+        agree = consensus(of_pairs[0], of_pairs[1], config.cluster_deg, seed)
         if not agree.any():
             break
         clusters.append([pair for pair, kept in zip(pairs, agree) if kept])
@@ -121,11 +122,13 @@ def _clusters(pairs: Pairs, rotations: FloatArray, config: HypothesesConfig, see
     return clusters
 
 
-def _aligned(rotations: list[FloatArray], clouds: list[FloatArray], size_ratio: float) -> Sim3Batch:
-    """Rotation as given, scale and translation such that extents and medians agree."""
-    centers = [torch.from_numpy(np.median(cloud, axis=0)).float() for cloud in clouds]
-    rotation = torch.from_numpy(np.stack(rotations)).float()
-    return Sim3Batch(torch.full((len(rotations),), size_ratio), rotation, centers[1] - size_ratio * (rotation @ centers[0]))
+def align_clouds(rotations: FloatArray, reference: FloatArray, target: FloatArray) -> Sim3Batch:
+    """target_from_reference with the rotations as given, shape (T, 3, 3), and scale and translation such that the clouds' extents and
+    medians agree."""
+    size_ratio = cloud_extent_m(target) / max(cloud_extent_m(reference), 1e-9)
+    centers = [torch.from_numpy(np.median(cloud, axis=0)).float() for cloud in (reference, target)]
+    rotation = torch.from_numpy(rotations).float()
+    return Sim3Batch(torch.full((len(rotation),), size_ratio), rotation, centers[1] - size_ratio * (rotation @ centers[0]))
 
 
 def _none() -> Sim3Batch:

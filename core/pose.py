@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import Literal
 
 import numpy as np
 import torch
@@ -19,11 +20,18 @@ from core.descriptors import unit
 from core.encode import EncodedBurst, EncodedView
 from core.errors import InvalidInput, NoPose
 from core.estimators.ransac import ransac
-from core.hypotheses import HypothesesConfig, distinct, propose
+from core.hypotheses import HypothesesConfig, align_clouds, distinct, propose
 from core.matches import Alternative, Matches, PoseEstimate, among_all_patches, end_points, pool
 from core.reference import Reference
 from core.sim3 import Sim3
-from core.viewpoints import best_reference_per_target, consensus, relative_rotations, view_agreement
+from core.viewpoints import (
+    best_reference_per_target,
+    consensus,
+    mean_rotation,
+    near_their_mean,
+    relative_rotations,
+    view_agreement,
+)
 from core.views import FloatArray
 
 Pairs = list[tuple[int, int]]
@@ -64,8 +72,10 @@ class PoseConfig:
     """θ of the consensus; None leaves it out (variants without C)."""
     inlier_ratio: float = 0.08
     """Inlier threshold as a share of the target's extent."""
-    best: BestConfig | None = None
-    """Judge many hypotheses densely instead of taking the first consensus."""
+    solver: Literal["retrieval", "umeyama", "agreement"] = "umeyama"
+    """From view pairs to a transform: the mean of their rotations, the paper's RANSAC, or ours over many hypotheses."""
+    best: BestConfig = field(default_factory=BestConfig)
+    """Of the solver `agreement`."""
 
     def __post_init__(self) -> None:
         if self.method not in METHODS:
@@ -81,13 +91,17 @@ class PoseConfig:
 
 _UCD = PoseConfig()
 VARIANTS = {
-    "best": replace(_UCD, variant="best", best=BestConfig()),
+    "best": replace(_UCD, variant="best", solver="agreement"),
     "ucd": _UCD,
+    "ucd+": replace(_UCD, variant="ucd+"),
     "ud": replace(_UCD, variant="ud", consensus_deg=None),
     "uc": replace(_UCD, variant="uc", dims=None),
     "u": replace(_UCD, variant="u", dims=None, consensus_deg=None),
+    "rc": replace(_UCD, variant="rc", dims=None, solver="retrieval"),
+    "r": replace(_UCD, variant="r", dims=None, consensus_deg=None, solver="retrieval"),
 }
-"""`best` is ours; of the paper's letters (table 1), U is Umeyama, C consensus, D reduced descriptors."""
+"""`best` is ours; of the paper's letters (table 1), R is retrieval, U Umeyama, C consensus, D reduced
+descriptors, + all the views there are."""
 
 
 class PoseEstimator:
@@ -106,18 +120,34 @@ class PoseEstimator:
         pair = _Pair(reference, target, self.config)
         clock.lap("match")
         threshold_m = self.config.inlier_ratio * cloud_extent_m(target.cloud_m)
-        if self.config.best is None:
-            estimate = self._by_consensus(pair, threshold_m, seed, clock)
-        else:
-            estimate = self._by_agreement(pair, self.config.best, threshold_m, seed, clock)
+        solve = {"retrieval": self._by_retrieval, "umeyama": self._by_consensus, "agreement": self._by_agreement}[self.config.solver]
+        estimate = solve(pair, threshold_m, seed, clock)
         return replace(estimate, matches=among_all_patches(estimate.matches, reference.views, target.views), stage_ms=clock.stage_ms)
+
+    def _by_retrieval(self, pair: _Pair, threshold_m: float, seed: int, clock: StageClock) -> PoseEstimate:
+        """The paper's R and RC: the mean rotation of the best view pairs, those far from it removed one by one with C (table 1).
+
+        The paper reports rotations only; scale and translation here make the clouds' extents and medians agree.
+        """
+        pairs = pair.best_pairs()
+        if not pairs:
+            raise NoPose("no view of the target resembles any view of the reference; send more views")
+        rotations = pair.rotations(pairs)
+        if self.config.consensus_deg is not None:
+            agree = near_their_mean(rotations, self.config.consensus_deg)
+            pairs, rotations = [each for each, kept in zip(pairs, agree) if kept], rotations[agree]
+        clouds = [np.concatenate([view.points_m for view in views]) for views in (pair.reference, pair.target)]
+        transform = align_clouds(mean_rotation(rotations)[None], clouds[0], clouds[1])[0]
+        matches, residual_m = _judge(pool(pair.found, pairs), transform, pair, threshold_m)
+        clock.lap("views")
+        return PoseEstimate(transform, matches, pair.similarity, tuple(pairs), residual_m)
 
     def _by_consensus(self, pair: _Pair, threshold_m: float, seed: int, clock: StageClock) -> PoseEstimate:
         """The paper's pipeline: best view pairs, consensus, RANSAC ("Viewpoint estimation", "Final pose estimation")."""
         pairs = pair.best_pairs()
         if self.config.consensus_deg is not None and pairs:
-            rotations = relative_rotations(pair.reference, pair.target)
-            agree = consensus(np.stack([rotations[each] for each in pairs]), self.config.consensus_deg, seed)
+            similarity = np.array([pair.similarity[each] for each in pairs])
+            agree = consensus(pair.rotations(pairs), similarity, self.config.consensus_deg, seed)
             pairs = [each for each, kept in zip(pairs, agree) if kept]
         clock.lap("views")
         matches = pool(pair.found, pairs)
@@ -127,8 +157,9 @@ class PoseEstimator:
             fit.target_from_reference, replace(matches, inlier=fit.inlier), pair.similarity, tuple(pairs), residual_m=fit.residual_m
         )
 
-    def _by_agreement(self, pair: _Pair, config: BestConfig, threshold_m: float, seed: int, clock: StageClock) -> PoseEstimate:
+    def _by_agreement(self, pair: _Pair, threshold_m: float, seed: int, clock: StageClock) -> PoseEstimate:
         """Ours: many hypotheses, the most promising refined, the one that lays the objects on each other best."""
+        config = self.config.best
         guesses = propose(pair.found, pair.similarity, pair.reference, pair.target, config.hypotheses, threshold_m, seed)
         if not len(guesses):
             raise NoPose("no view pair gives a hypothesis of plausible size; send more views or better depth")
@@ -138,7 +169,7 @@ class PoseEstimator:
         clock.lap("score")
         refined = agreement.refine(guesses.select(promising))
         scores = agreement.score(refined)
-        views = view_agreement(refined.rotation.numpy(), relative_rotations(pair.reference, pair.target), pair.similarity, config.view_deg)
+        views = view_agreement(refined.rotation.numpy(), pair.relative, pair.similarity, config.view_deg)
         scores = scores * torch.from_numpy(np.exp(config.view_weight * views))
         ranked = distinct(refined, scores, config.alternative_deg, 1 + config.alternatives)
         clock.lap("refine")
@@ -162,6 +193,7 @@ class _Pair:
         sides = [self._patches(views, vectors, config) for views, vectors in zip((self.reference, self.target), self.descriptors)]
         self.found: PairMatches = match(sides[0], sides[1], config.correspondences, config.method)
         self.similarity: FloatArray = self.found.view_similarity().numpy()
+        self.relative = relative_rotations(self.reference, self.target)
 
     @staticmethod
     def _patches(views: Sequence[EncodedView], vectors: Sequence[FloatArray], config: PoseConfig) -> PatchSet:
@@ -171,6 +203,10 @@ class _Pair:
     def best_pairs(self) -> Pairs:
         """Every target view with its most similar reference view, where anything matched."""
         return [each for each in best_reference_per_target(self.similarity) if self.similarity[each] > 0]
+
+    def rotations(self, pairs: Pairs) -> FloatArray:
+        """target_from_reference of each pair, if it showed its objects from the same side, shape (Q, 3, 3)."""
+        return np.stack([self.relative[each] for each in pairs])
 
 
 def _describe(views: Sequence[EncodedView], reference: Reference, dims: int | None) -> list[FloatArray]:

@@ -50,11 +50,32 @@ def angles_deg(rotations: FloatArray, others: FloatArray) -> FloatArray:
     return np.degrees(np.arccos(np.clip((traces - 1) / 2, -1, 1)))
 
 
-def consensus(rotations: FloatArray, angle_deg: float, seed: int) -> NDArray[np.bool_]:
-    """The largest set within `angle_deg` of one of many random rotations, shape (Q,), from shape (Q, 3, 3)."""
+def consensus(rotations: FloatArray, similarity: FloatArray, angle_deg: float, seed: int) -> NDArray[np.bool_]:
+    """The largest set within `angle_deg` of one of many random rotations, shape (Q,); of sets as large, the most similar pairs.
+
+    Args:
+        rotations: of the view pairs, shape (Q, 3, 3).
+        similarity: S of the pairs, shape (Q,). With ten views sets of equal size are common, and front and back are often such a pair.
+    """
     samples = Rotation.random(ROTATION_SAMPLES, rng=seed).as_matrix()
     near = angles_deg(rotations, samples) < angle_deg
-    return np.asarray(near[:, int(near.sum(axis=0).argmax())])
+    tie_break = similarity / max(float(similarity.sum()), 1e-9) / 2
+    return np.asarray(near[:, int((near * (1 + tie_break[:, None])).sum(axis=0).argmax())])
+
+
+def mean_rotation(rotations: FloatArray) -> FloatArray:
+    """The chordal mean of rotations, shape (3, 3), from shape (Q, 3, 3)."""
+    return np.asarray(Rotation.from_matrix(rotations).mean().as_matrix())
+
+
+def near_their_mean(rotations: FloatArray, angle_deg: float) -> NDArray[np.bool_]:
+    """The rotations, shape (Q,) of (Q, 3, 3), left when the farthest from the mean is removed until all are within `angle_deg` of it."""
+    kept = np.ones(len(rotations), dtype=bool)
+    while True:
+        off = angles_deg(rotations, mean_rotation(rotations[kept])[None])[:, 0] * kept
+        if off.max() <= angle_deg:
+            return kept
+        kept[off.argmax()] = False
 
 
 def view_agreement(rotations: FloatArray, relative: FloatArray, view_similarity: FloatArray, angle_deg: float) -> FloatArray:

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from core.sim3 import Sim3, rotation_angle_deg
-from core.viewpoints import best_reference_per_target, consensus, relative_rotations, view_agreement
+from core.viewpoints import best_reference_per_target, consensus, mean_rotation, near_their_mean, relative_rotations, view_agreement
 
 from .conftest import PaintedObject
 
@@ -20,17 +20,27 @@ def test_best_reference_is_the_column_maximum() -> None:
 
 
 def test_the_largest_agreeing_set_wins() -> None:
-    assert consensus(around_z(0, 10, 20, 120, 130, 200), 30, seed=0).tolist() == [True, True, True, False, False, False]
+    assert consensus(around_z(0, 10, 20, 120, 130, 200), np.ones(6), 30, seed=0).tolist() == [True, True, True, False, False, False]
+
+
+def test_of_sets_as_large_the_more_similar_wins() -> None:
+    rotations = around_z(0, 10, 180, 190)
+    assert consensus(rotations, np.array([20.0, 20, 30, 30]), 30, seed=0).tolist() == [False, False, True, True]
+    assert consensus(rotations, np.array([30.0, 30, 20, 20]), 30, seed=0).tolist() == [True, True, False, False]
+
+
+def test_similarity_never_outvotes_size() -> None:
+    assert consensus(around_z(0, 10, 20, 180), np.array([1.0, 1, 1, 99]), 30, seed=0).tolist() == [True, True, True, False]
 
 
 def test_a_tighter_angle_drops_the_edges() -> None:
-    kept = consensus(around_z(0, 5, 40), 15, seed=0)
+    kept = consensus(around_z(0, 5, 40), np.ones(3), 15, seed=0)
     assert kept.tolist() == [True, True, False]
 
 
 def test_the_same_seed_gives_the_same_consensus() -> None:
     rotations = Rotation.random(12, rng=3).as_matrix()
-    assert np.array_equal(consensus(rotations, 40, 7), consensus(rotations, 40, 7))
+    assert np.array_equal(consensus(rotations, np.ones(12), 40, 7), consensus(rotations, np.ones(12), 40, 7))
 
 
 def test_views_from_the_same_side_give_the_true_rotation(painted: PaintedObject, moved: Sim3) -> None:
@@ -46,6 +56,15 @@ def test_a_rotation_that_joins_similar_views_agrees_more_than_others(painted: Pa
     right, wrong = view_agreement(np.stack([moved.rotation, half_turn]), relative, np.eye(4) + 1, 30)
     assert right > 1
     assert wrong < 0
+
+
+def test_mean_rotation() -> None:
+    assert rotation_angle_deg(mean_rotation(around_z(10, 30)), around_z(20)[0]) < 1e-4
+
+
+def test_the_farthest_from_the_mean_leaves_first() -> None:
+    assert near_their_mean(around_z(0, 10, 20, 170), 30).tolist() == [True, True, True, False]
+    assert near_their_mean(around_z(0, 10), 30).all()
 
 
 def test_views_that_are_all_alike_say_nothing(painted: PaintedObject) -> None:
