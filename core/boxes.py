@@ -80,7 +80,8 @@ def oriented_box(points: FloatArray) -> OrientedBox:
         )
     cloud = _cloud(points)
     try:
-        box = cloud.get_minimal_oriented_bounding_box()
+        with o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):  # it warns of candidates that it drops itself
+            box = cloud.get_minimal_oriented_bounding_box()
     except RuntimeError:  # all in one plane: the hull needs joggled input, of which the smallest box fails
         box = cloud.get_oriented_bounding_box(robust=True)
     axes = np.asarray(box.R)
