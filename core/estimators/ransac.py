@@ -29,6 +29,10 @@ def ransac(source: FloatArray, target: FloatArray, threshold_m: float, seed: int
     if not len(trials):
         raise NoPose("every sample of correspondences is collinear or absurdly scaled; the views may show too little of the object")
     best = int(inliers.sum(dim=1).argmax())
+    if inliers[best].sum() < MIN_CORRESPONDENCES:
+        raise NoPose(
+            f"no {MIN_CORRESPONDENCES} of {len(source)} correspondences agree on one transform; the objects may be of different kinds"
+        )
     return _polish(source, target, trials[best], inliers[best].numpy(), threshold_m)
 
 

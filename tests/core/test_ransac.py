@@ -43,3 +43,9 @@ def test_collinear_correspondences_are_no_pose() -> None:
     line = np.outer(np.linspace(0, 1, 20), [1.0, 2, 3])
     with pytest.raises(NoPose, match="collinear"):
         ransac(line, line, 0.1, seed=0)
+
+
+def test_correspondences_that_do_not_agree_are_no_pose() -> None:
+    rng = np.random.default_rng(0)
+    with pytest.raises(NoPose, match="agree"):
+        ransac(rng.normal(size=(12, 3)), rng.normal(size=(12, 3)), 1e-4, seed=0)
