@@ -31,7 +31,7 @@ def ransac(source: FloatArray, target: FloatArray, threshold_m: float, seed: int
     best = int(inliers.sum(dim=1).argmax())
     if inliers[best].sum() < MIN_CORRESPONDENCES:
         raise NoPose(
-            f"no {MIN_CORRESPONDENCES} of {len(source)} correspondences agree on one transform; the objects may be of different kinds"
+            f"no {MIN_CORRESPONDENCES} of {len(source)} correspondences agree on a transform; are these objects of one kind?"
         )
     return _polish(source, target, trials[best], inliers[best].numpy(), threshold_m)
 
