@@ -44,9 +44,11 @@ def test_a_view_comes_back_as_it_was_sent(client, look, learn):
     assert np.array_equal(shown[..., ::-1], look().views[2].rgb)
 
 
-def test_missing_depth_is_black(client, look, learn):
+def test_missing_depth_is_filled_in_at_half_brightness(client, look, learn):
     shown = picture(client.get(f"/v1/categories/{learn()['id']}/views/1/depth.png"))
-    assert np.array_equal(shown.any(axis=2), look().views[1].depth_m > 0)
+    measured = look().views[1].depth_m > 0
+    assert shown.any(axis=2).all()
+    assert shown[~measured].max() < 128 < shown[measured].max()
 
 
 def test_the_foreground_is_brighter_than_the_rest(client, learn):
