@@ -30,9 +30,7 @@ def ransac(source: FloatArray, target: FloatArray, threshold_m: float, seed: int
         raise NoPose("every sample of correspondences is collinear or absurdly scaled; the views may show too little of the object")
     best = int(inliers.sum(dim=1).argmax())
     if inliers[best].sum() < MIN_CORRESPONDENCES:
-        raise NoPose(
-            f"no {MIN_CORRESPONDENCES} of {len(source)} correspondences agree on a transform; are these objects of one kind?"
-        )
+        raise NoPose(f"no {MIN_CORRESPONDENCES} of {len(source)} correspondences agree on a transform; are these objects of one kind?")
     return _polish(source, target, trials[best], inliers[best].numpy(), threshold_m)
 
 
