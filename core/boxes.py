@@ -26,11 +26,6 @@ class OrientedBox:
     extent_m: FloatArray
     """Edge lengths along the object's axes, shape (3,), metres."""
 
-    @property
-    def diagonal_m(self) -> float:
-        """Length of the box's diagonal, metres."""
-        return float(np.linalg.norm(self.extent_m))
-
     def corners(self) -> FloatArray:
         """The eight corners in the world frame, shape (8, 3); corner b has sign bits b of (x, y, z)."""
         signs = np.array([[(b >> axis & 1) - 0.5 for axis in range(3)] for b in range(8)])

@@ -5,23 +5,19 @@ Letters: M reference views, N target views, T transforms.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import torch
 
 from core.boxes import cloud_extent_m
-from core.correspond import PairMatches
-from core.encode import EncodedView
 from core.estimators.base import MIN_CORRESPONDENCES
 from core.estimators.batched import Sim3Batch, umeyama_batch
 from core.estimators.ransac import sample
+from core.matched_pair import MatchedPair, Pairs
 from core.matches import end_points, pool
-from core.viewpoints import angles_deg, best_reference_per_target, consensus, relative_rotations
+from core.viewpoints import angles_deg, consensus
 from core.views import FloatArray
-
-Pairs = list[tuple[int, int]]
 
 
 @dataclass(frozen=True)
@@ -46,40 +42,24 @@ class HypothesesConfig:
     """A guess may differ by this factor from the ratio of the two clouds' extents."""
 
 
-def propose(
-    found: PairMatches,
-    similarity: FloatArray,
-    reference: Sequence[EncodedView],
-    target: Sequence[EncodedView],
-    config: HypothesesConfig,
-    threshold_m: float,
-    seed: int,
-) -> Sim3Batch:
-    """Guesses of target_from_reference; empty where nothing matches.
-
-    Args:
-        found, similarity: matches of the views' trusted patches and their S, shape (M, N).
-        threshold_m: inlier distance.
-    """
-    ranked = [(int(pair[0]), int(pair[1])) for pair in np.argwhere(similarity > 0)]
-    ranked.sort(key=lambda pair: -similarity[pair])
+def propose(pair: MatchedPair, config: HypothesesConfig, threshold_m: float, seed: int) -> Sim3Batch:
+    """Guesses of target_from_reference; empty where nothing matches. `threshold_m` is the inlier distance."""
+    similarity = pair.similarity
+    ranked = [(int(each[0]), int(each[1])) for each in np.argwhere(similarity > 0)]
+    ranked.sort(key=lambda each: -similarity[each])
     if not ranked:
         return _none()
-    clouds = [np.concatenate([view.points_m for view in views]) for views in (reference, target)]
-    size_ratio = cloud_extent_m(clouds[1]) / max(cloud_extent_m(clouds[0]), 1e-9)
-    rotations = relative_rotations(reference, target)
 
     def fit(pairs: Pairs, trials: int, keep: int) -> Sim3Batch:
-        source, aim = end_points(pool(found, pairs), reference, target)
+        source, aim = end_points(pool(pair.found, pairs), pair.reference, pair.target)
         return _best_samples(source, aim, threshold_m, trials, keep, seed)
 
-    batches = [fit([pair for pair in best_reference_per_target(similarity) if similarity[pair] > 0], config.pooled_trials, config.pooled)]
-    batches += [fit([pair], config.single_trials, 1) for pair in ranked[: config.single_pairs]]
-    for cluster in _clusters(ranked[: config.clustered_pairs], rotations, similarity, config, seed):
-        batches.append(fit(cluster, config.cluster_trials, config.per_cluster))
-    batches.append(align_clouds(np.stack([rotations[pair] for pair in ranked[: config.aligned_pairs]]), clouds[0], clouds[1]))
-    together = Sim3Batch.concatenate(batches)
-    off = together.scale / size_ratio
+    aligned = align_clouds(pair.rotations(ranked[: config.aligned_pairs]), *pair.clouds)
+    batches = [fit(pair.best_pairs(), config.pooled_trials, config.pooled)]
+    batches += [fit([each], config.single_trials, 1) for each in ranked[: config.single_pairs]]
+    batches += [fit(cluster, config.cluster_trials, config.per_cluster) for cluster in _clusters(pair, ranked, config, seed)]
+    together = Sim3Batch.concatenate([*batches, aligned])
+    off = together.scale / aligned.scale[0]
     return together.select(((off < config.max_scale_ratio) & (off > 1 / config.max_scale_ratio)).nonzero().flatten())
 
 
@@ -109,16 +89,16 @@ def _best_samples(source: FloatArray, target: FloatArray, threshold_m: float, tr
     return Sim3Batch(fitted.scale.float(), fitted.rotation.float(), fitted.translation.float())
 
 
-def _clusters(pairs: Pairs, rotations: FloatArray, similarity: FloatArray, config: HypothesesConfig, seed: int) -> list[Pairs]:
-    """Largest agreeing set, then the largest of the rest, and so on."""
+def _clusters(pair: MatchedPair, ranked: Pairs, config: HypothesesConfig, seed: int) -> list[Pairs]:
+    """Of the most similar pairs the largest agreeing set, then the largest of the rest, and so on."""
+    left = ranked[: config.clustered_pairs]
     clusters: list[Pairs] = []
-    while pairs and len(clusters) < config.clusters:
-        of_pairs = [np.stack([each[pair] for pair in pairs]) for each in (rotations, similarity)]
-        agree = consensus(of_pairs[0], of_pairs[1], config.cluster_deg, seed)
+    while left and len(clusters) < config.clusters:
+        agree = consensus(pair.rotations(left), pair.similarities(left), config.cluster_deg, seed)
         if not agree.any():
             break
-        clusters.append([pair for pair, kept in zip(pairs, agree) if kept])
-        pairs = [pair for pair, kept in zip(pairs, agree) if not kept]
+        clusters.append([each for each, kept in zip(left, agree) if kept])
+        left = [each for each, kept in zip(left, agree) if not kept]
     return clusters
 
 

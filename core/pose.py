@@ -5,7 +5,6 @@ Letters: M reference views, N target views, K correspondences, T transforms.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
@@ -14,27 +13,23 @@ import torch
 
 from core.boxes import cloud_extent_m
 from core.clock import StageClock
-from core.correspond import METHODS, PairMatches, PatchSet, match
+from core.correspond import METHODS
 from core.dense import DenseAgreement, DenseConfig
-from core.descriptors import unit
-from core.encode import EncodedBurst, EncodedView
+from core.encode import EncodedBurst
 from core.errors import InvalidInput, NoPose
+from core.estimators.base import refit
 from core.estimators.ransac import ransac
 from core.hypotheses import HypothesesConfig, align_clouds, distinct, propose
+from core.matched_pair import MatchedPair
 from core.matches import Alternative, Matches, PoseEstimate, among_all_patches, end_points, pool
 from core.reference import Reference
 from core.sim3 import Sim3
 from core.viewpoints import (
-    best_reference_per_target,
     consensus,
     mean_rotation,
     near_their_mean,
-    relative_rotations,
     view_agreement,
 )
-from core.views import FloatArray
-
-Pairs = list[tuple[int, int]]
 
 
 @dataclass(frozen=True)
@@ -116,15 +111,15 @@ class PoseEstimator:
         Raises InvalidInput for tokens of another backbone or views without cameras or depth, NoPose where nothing fits.
         """
         require_comparable(reference, target)
-        clock = StageClock()
-        pair = _Pair(reference, target, self.config)
+        clock, config = StageClock(), self.config
+        pair = MatchedPair(reference, target, config.dims, config.correspondences, config.method)
         clock.lap("match")
         threshold_m = self.config.inlier_ratio * cloud_extent_m(target.cloud_m)
         solve = {"retrieval": self._by_retrieval, "umeyama": self._by_consensus, "agreement": self._by_agreement}[self.config.solver]
         estimate = solve(pair, threshold_m, seed, clock)
         return replace(estimate, matches=among_all_patches(estimate.matches, reference.views, target.views), stage_ms=clock.stage_ms)
 
-    def _by_retrieval(self, pair: _Pair, threshold_m: float, seed: int, clock: StageClock) -> PoseEstimate:
+    def _by_retrieval(self, pair: MatchedPair, threshold_m: float, seed: int, clock: StageClock) -> PoseEstimate:
         """The paper's R and RC: the mean rotation of the best view pairs, those far from it removed one by one with C (table 1).
 
         The paper reports rotations only; scale and translation here make the clouds' extents and medians agree.
@@ -136,18 +131,16 @@ class PoseEstimator:
         if self.config.consensus_deg is not None:
             agree = near_their_mean(rotations, self.config.consensus_deg)
             pairs, rotations = [each for each, kept in zip(pairs, agree) if kept], rotations[agree]
-        clouds = [np.concatenate([view.points_m for view in views]) for views in (pair.reference, pair.target)]
-        transform = align_clouds(mean_rotation(rotations)[None], clouds[0], clouds[1])[0]
+        transform = align_clouds(mean_rotation(rotations)[None], *pair.clouds)[0]
         matches, residual_m = _judge(pool(pair.found, pairs), transform, pair, threshold_m)
         clock.lap("views")
         return PoseEstimate(transform, matches, pair.similarity, tuple(pairs), residual_m)
 
-    def _by_consensus(self, pair: _Pair, threshold_m: float, seed: int, clock: StageClock) -> PoseEstimate:
+    def _by_consensus(self, pair: MatchedPair, threshold_m: float, seed: int, clock: StageClock) -> PoseEstimate:
         """The paper's pipeline: best view pairs, consensus, RANSAC ("Viewpoint estimation", "Final pose estimation")."""
         pairs = pair.best_pairs()
         if self.config.consensus_deg is not None and pairs:
-            similarity = np.array([pair.similarity[each] for each in pairs])
-            agree = consensus(pair.rotations(pairs), similarity, self.config.consensus_deg, seed)
+            agree = consensus(pair.rotations(pairs), pair.similarities(pairs), self.config.consensus_deg, seed)
             pairs = [each for each, kept in zip(pairs, agree) if kept]
         clock.lap("views")
         matches = pool(pair.found, pairs)
@@ -157,10 +150,10 @@ class PoseEstimator:
             fit.target_from_reference, replace(matches, inlier=fit.inlier), pair.similarity, tuple(pairs), residual_m=fit.residual_m
         )
 
-    def _by_agreement(self, pair: _Pair, threshold_m: float, seed: int, clock: StageClock) -> PoseEstimate:
+    def _by_agreement(self, pair: MatchedPair, threshold_m: float, seed: int, clock: StageClock) -> PoseEstimate:
         """Ours: many hypotheses, the most promising refined, the one that lays the objects on each other best."""
         config = self.config.best
-        guesses = propose(pair.found, pair.similarity, pair.reference, pair.target, config.hypotheses, threshold_m, seed)
+        guesses = propose(pair, config.hypotheses, threshold_m, seed)
         if not len(guesses):
             raise NoPose("no view pair gives a hypothesis of plausible size; send more views or better depth")
         clock.lap("propose")
@@ -183,43 +176,11 @@ class PoseEstimator:
         return PoseEstimate(transform, matches, pair.similarity, tuple(pairs), residual_m, score=score, alternatives=alternatives)
 
 
-class _Pair:
-    """A reference and a target, trusted patches only, described in one basis and matched."""
-
-    def __init__(self, reference: Reference, target: EncodedBurst, config: PoseConfig) -> None:
-        self.reference = [view.trusted_only() for view in reference.views]
-        self.target = [view.trusted_only() for view in target.views]
-        self.descriptors = _describe(self.reference, reference, config.dims), _describe(self.target, reference, config.dims)
-        sides = [self._patches(views, vectors, config) for views, vectors in zip((self.reference, self.target), self.descriptors)]
-        self.found: PairMatches = match(sides[0], sides[1], config.correspondences, config.method)
-        self.similarity: FloatArray = self.found.view_similarity().numpy()
-        self.relative = relative_rotations(self.reference, self.target)
-
-    @staticmethod
-    def _patches(views: Sequence[EncodedView], vectors: Sequence[FloatArray], config: PoseConfig) -> PatchSet:
-        places = [view.points_m if config.method == "cyclical-3d" else view.cells.astype(np.float32) for view in views]
-        return PatchSet.pad(vectors, places)
-
-    def best_pairs(self) -> Pairs:
-        """Every target view with its most similar reference view, where anything matched."""
-        return [each for each in best_reference_per_target(self.similarity) if self.similarity[each] > 0]
-
-    def rotations(self, pairs: Pairs) -> FloatArray:
-        """target_from_reference of each pair, if it showed its objects from the same side, shape (Q, 3, 3)."""
-        return np.stack([self.relative[each] for each in pairs])
-
-
-def _describe(views: Sequence[EncodedView], reference: Reference, dims: int | None) -> list[FloatArray]:
-    """Unit descriptors of each view's patches, along the reference's first `dims` components."""
-    return [unit(view.descriptors if dims is None else reference.basis.project(view.descriptors, dims)) for view in views]
-
-
-def _judge(matches: Matches, transform: Sim3, pair: _Pair, threshold_m: float) -> tuple[Matches, float]:
+def _judge(matches: Matches, transform: Sim3, pair: MatchedPair, threshold_m: float) -> tuple[Matches, float]:
     """Correspondences marked as inliers of a transform, and the inliers' residual."""
     source, aim = end_points(matches, pair.reference, pair.target)
-    errors = np.linalg.norm(transform.apply(source) - aim, axis=1)
-    inlier = errors < threshold_m
-    return replace(matches, inlier=inlier), float(np.sqrt((errors[inlier] ** 2).mean())) if inlier.any() else 0.0
+    inlier = np.linalg.norm(transform.apply(source) - aim, axis=1) < threshold_m
+    return replace(matches, inlier=inlier), refit(source, aim, transform, inlier).residual_m
 
 
 def require_comparable(reference: Reference, target: EncodedBurst) -> None:
