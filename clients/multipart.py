@@ -1,15 +1,16 @@
-"""How a burst travels: one JSON part and the images."""
+"""How a burst travels: one JSON part and the images, or one npz file."""
 
 from __future__ import annotations
 
+import io
 import json
 from collections.abc import Sequence
 from typing import Any
 
-import cv2
 import numpy as np
-from numpy.typing import NDArray
+import simplejpeg
 
+from clients.png import encode_png
 from core.errors import InvalidInput
 from core.views import Burst, View
 
@@ -33,8 +34,29 @@ def burst_parts(burst: Burst, frame: str | None = None) -> list[Part]:
     if _all_or_none("depth", [view.depth_m for view in views]):
         parts += [_image("depth", index, _depth_png(view, index)) for index, view in enumerate(views)]
     if _all_or_none("mask", [view.mask for view in views]):
-        parts += [_image("mask", index, _encode(".png", np.asarray(view.mask, dtype=np.uint8) * 255)) for index, view in enumerate(views)]
+        parts += [_image("mask", index, encode_png(np.asarray(view.mask, dtype=np.uint8) * 255)) for index, view in enumerate(views)]
     return parts
+
+
+def burst_npz(burst: Burst) -> bytes:
+    """The application/x-npz body of `burst`: exact, and many times larger than the parts.
+
+    Raises InvalidInput as `burst_parts`, and where views differ in size.
+    """
+    views = burst.views
+    sizes = {view.size for view in views}
+    if len(sizes) > 1:
+        raise InvalidInput("views", f"have {len(sizes)} sizes of images, and an npz has one array for all; send them as multipart")
+    arrays = {"rgb": np.stack([view.rgb for view in views])}
+    if _all_or_none("camera", [view.camera for view in views]):
+        arrays["K"] = np.stack([camera.K for camera in burst.cameras])
+        arrays["world_from_camera"] = np.stack([camera.world_from_camera for camera in burst.cameras])
+    for name, values in (("depth_m", [view.depth_m for view in views]), ("mask", [view.mask for view in views])):
+        if _all_or_none(name, values):
+            arrays[name] = np.stack([value for value in values if value is not None])
+    stream = io.BytesIO()
+    np.savez_compressed(stream, allow_pickle=False, **arrays)
+    return stream.getvalue()
 
 
 def _all_or_none(name: str, values: Sequence[object | None]) -> bool:
@@ -50,7 +72,7 @@ def _image(field: str, index: int, content: bytes) -> Part:
 
 
 def _jpeg(view: View) -> bytes:
-    return _encode(".jpg", cv2.cvtColor(view.rgb, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
+    return bytes(simplejpeg.encode_jpeg(np.ascontiguousarray(view.rgb), quality=JPEG_QUALITY, colorsubsampling="420"))
 
 
 def _depth_png(view: View, index: int) -> bytes:
@@ -59,9 +81,4 @@ def _depth_png(view: View, index: int) -> bytes:
     if units.max() > np.iinfo(np.uint16).max:
         reach_m = np.iinfo(np.uint16).max * DEPTH_UNIT_M
         raise InvalidInput(f"views[{index}].depth", f"reaches {view.depth_m.max():.1f} m; set what is beyond {reach_m:.0f} m to 0")
-    return _encode(".png", units.astype(np.uint16))
-
-
-def _encode(suffix: str, image: NDArray[Any], options: Sequence[int] = ()) -> bytes:
-    _, encoded = cv2.imencode(suffix, image, list(options))
-    return bytes(encoded)
+    return encode_png(units.astype(np.uint16))

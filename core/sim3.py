@@ -9,7 +9,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from core.errors import InvalidInput, NoPose
 
@@ -59,7 +58,7 @@ class Sim3:
     @property
     def quaternion(self) -> FloatArray:
         """The rotation as (w, x, y, z) with w ≥ 0, shape (4,)."""
-        return np.asarray(Rotation.from_matrix(self.rotation).as_quat(canonical=True, scalar_first=True))
+        return _quaternion(self.rotation)
 
     def apply(self, points: FloatArray) -> FloatArray:
         """Points of frame a, shape (*, 3), in frame b."""
@@ -73,6 +72,22 @@ class Sim3:
     def __matmul__(self, other: Sim3) -> Sim3:
         """c_from_b @ b_from_a = c_from_a."""
         return Sim3(self.scale * other.scale, self.rotation @ other.rotation, self.apply(other.translation))
+
+
+def _quaternion(rotation: FloatArray) -> FloatArray:
+    """(w, x, y, z) with w ≥ 0 of a rotation matrix, shape (3, 3): the eigenvector of largest eigenvalue of Bar-Itzhack's matrix (2000).
+
+    By numpy alone, since a robot's client has no SciPy.
+    """
+    trace = np.trace(rotation)
+    axis = np.array([rotation[2, 1] - rotation[1, 2], rotation[0, 2] - rotation[2, 0], rotation[1, 0] - rotation[0, 1]])
+    symmetric = np.empty((4, 4))
+    symmetric[0, 0] = trace
+    symmetric[0, 1:] = symmetric[1:, 0] = axis
+    symmetric[1:, 1:] = rotation + rotation.T - trace * np.eye(3)
+    quaternion = np.linalg.eigh(symmetric)[1][:, -1]
+    leading = quaternion[np.abs(quaternion) > 1e-12][0]
+    return np.asarray(quaternion * np.sign(leading))
 
 
 def rotation_angle_deg(first: FloatArray, second: FloatArray) -> FloatArray:

@@ -14,6 +14,9 @@ from clients.cli import bench, demo, memory, robot, service
 from clients.cli.terminal import errors
 from core.errors import OneLookError
 
+OWN = {"core", "store", "service", "clients", "benchmarks"}
+"""This distribution's packages: that one is missing is no matter of extras."""
+
 
 class OneLookGroup(TyperGroup):
     """Says an expected error in one sentence, and exits with 1."""
@@ -24,6 +27,16 @@ class OneLookGroup(TyperGroup):
             return super().invoke(ctx)
         except OneLookError as error:
             errors.print(f"[bold red]error:[/] {error}", highlight=False, soft_wrap=True)
+            raise typer.Exit(1) from None
+        except ModuleNotFoundError as error:
+            library = (error.name or "").split(".")[0]
+            if library in OWN:
+                raise
+            errors.print(
+                f"[bold red]error:[/] this command needs {library}, which is not installed; run: pip install 'onelook\\[server]'",
+                highlight=False,
+                soft_wrap=True,
+            )
             raise typer.Exit(1) from None
 
 

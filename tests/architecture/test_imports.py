@@ -11,10 +11,14 @@ import ast
 import re
 import sys
 from collections.abc import Iterator
-from importlib.metadata import requires
 from pathlib import Path
 
 import pytest
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
 
 ROOT = Path(__file__).parents[2]
 ALLOWED = {
@@ -118,11 +122,25 @@ def test_libraries_stay_where_they_belong(package: str) -> None:
     assert not wrong
 
 
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+
+
+def declared(*extras: str) -> set[str]:
+    """Distributions that an installation with these extras names itself."""
+    listed = [*PROJECT["dependencies"], *(each for extra in extras for each in PROJECT["optional-dependencies"][extra])]
+    return {re.split(r"[=;\[ ]", each)[0].lower() for each in listed}
+
+
+def distributions(names: set[str]) -> set[str]:
+    """What the third-party modules among `names` are installed as."""
+    libraries = {name.split(".")[0] for name in names} - {*ALLOWED, *sys.stdlib_module_names}
+    return {DISTRIBUTIONS.get(each, each.replace("_", "-")) for each in libraries}
+
+
 @pytest.mark.parametrize("package", ALLOWED)
 def test_what_is_imported_is_a_direct_dependency(package: str) -> None:
-    declared = {re.split(r"[=;\[ ]", each)[0].lower() for each in requires("onelook") or () if "extra ==" not in each}
-    libraries = {name.split(".")[0] for path in modules(package) for name, _ in imports(path)} - {*ALLOWED, *sys.stdlib_module_names}
-    assert {DISTRIBUTIONS.get(each, each.replace("_", "-")) for each in libraries} <= declared
+    imported = {name for path in modules(package) for name, _ in imports(path)}
+    assert distributions(imported) <= declared("cli", "server")
 
 
 def test_core_touches_no_files_but_weights() -> None:
@@ -145,19 +163,20 @@ def _touches_files(function: ast.expr) -> bool:
     return False
 
 
-def test_a_robot_needs_no_torch() -> None:
-    """What `clients.robot` imports, all the way down, loads on a small computer."""
+@pytest.mark.parametrize(("start", "extras"), [("clients.robot", ()), ("clients.command", ()), ("clients.cli", ("cli",))])
+def test_an_installation_has_what_its_part_imports(start: str, extras: tuple[str, ...]) -> None:
+    """What is imported all the way down comes with the distribution, or with the extra: a robot's computer has no torch."""
     known = {module_name(path): path for package in ALLOWED for path in modules(package)}
-    reached, waiting = set(), ["clients.robot"]
+    reached, waiting = set(), [start]
     while waiting:
         name = waiting.pop()
-        if name in reached:
+        if name in reached or name not in known:
             continue
         reached.add(name)
-        waiting += [imported for imported, top in imports(known[name]) if top and imported in known] if name in known else []
-        libraries = {imported.split(".")[0] for imported, top in imports(known[name]) if top} if name in known else set()
-        assert not libraries & LEARNING, f"{name} imports {libraries & LEARNING}"
-    assert "core.views" in reached
+        waiting += [imported for imported, top in imports(known[name]) if top]
+        libraries = {imported for imported, top in imports(known[name]) if top}
+        assert distributions(libraries) <= declared(*extras), f"{name} imports what only another extra brings"
+    assert reached >= {start}
 
 
 @pytest.mark.parametrize("package", ALLOWED)

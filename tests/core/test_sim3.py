@@ -87,3 +87,17 @@ def test_negative_scale_is_refused() -> None:
 def test_angle_between_rotations() -> None:
     turned = Rotation.from_euler("z", 40, degrees=True).as_matrix()
     assert np.isclose(rotation_angle_deg(np.eye(3), turned), 40)
+
+
+@given(similarities())
+def test_the_quaternion_is_of_the_rotation(transform: Sim3) -> None:
+    quaternion = transform.quaternion
+    assert quaternion[0] >= 0
+    np.testing.assert_allclose(Rotation.from_quat(quaternion, scalar_first=True).as_matrix(), transform.rotation, atol=1e-9)
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_half_turns_have_their_axis_as_quaternion(axis: int) -> None:
+    half_turn = -np.eye(3)
+    half_turn[axis, axis] = 1
+    np.testing.assert_allclose(Sim3(1.0, half_turn, np.zeros(3)).quaternion, [0, *np.eye(3)[axis]], atol=1e-12)
