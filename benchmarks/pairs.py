@@ -21,15 +21,26 @@ class ViewCounts:
 
     text: str
     """As the caller wrote it."""
-    reference: int
-    target: int
+    reference: int | None
+    """None is all there are."""
+    target: int | None
+
+    @staticmethod
+    def all() -> ViewCounts:
+        """Every view there is."""
+        return ViewCounts("all", None, None)
 
     @staticmethod
     def parse(text: str) -> ViewCounts:
-        """`10` is 10 + 10 views; `10+3` is 10 of the reference and 3 of the target. Raises InvalidInput for anything else."""
+        """`10` is 10 + 10 views; `10+3` is 10 of the reference and 3 of the target; `all` is every view there is.
+
+        Raises InvalidInput for anything else.
+        """
+        if text == "all":
+            return ViewCounts.all()
         parts = text.split("+")
         if len(parts) > 2 or not all(part.isdecimal() and int(part) > 0 for part in parts):
-            raise InvalidInput("views", f"expected a count such as 10, or reference+target such as 10+3, found {text!r}")
+            raise InvalidInput("views", f"expected a count such as 10, reference+target such as 10+3, or all, found {text!r}")
         return ViewCounts(text, int(parts[0]), int(parts[-1]))
 
 
@@ -51,8 +62,8 @@ def sample_pairs(sequences: Sequence[folders.Sequence], limit: int, seed: int) -
     return pairs
 
 
-def choose_views(name: str, role: str, available: int, count: int, seed: int) -> list[int]:
-    """`count` of the `available` views of sequence `name`, ascending indices.
+def choose_views(name: str, role: str, available: int, count: int | None, seed: int) -> list[int]:
+    """`count` of the `available` views of sequence `name`, ascending indices; None is all.
 
     The first of a random order, one for each `role` ("reference" or "target"), so that the views of `10+3` are among those of `10+10`.
     """

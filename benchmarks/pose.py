@@ -11,8 +11,9 @@ import time
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from functools import lru_cache
-from itertools import groupby
+from itertools import groupby, product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -23,10 +24,9 @@ from benchmarks.tables import print_table, write_json
 from clients.datasets import folders
 from clients.pose_error import NO_POSE, PoseError, accuracy, median, pose_error
 from core.backbones.dino import load_backbone
-from core.descriptors import KEPT_COMPONENTS
 from core.encode import EncodedBurst, Encoder
 from core.errors import InvalidInput, NoPose
-from core.pose import PoseConfig, PoseEstimator
+from core.pose import PoseConfig, PoseEstimator, PoseOptions, component_count
 from core.reference import Reference, build_reference
 
 DEFAULT_LIMIT = 30
@@ -42,14 +42,34 @@ class Setting:
     dims: int
     """Descriptor size."""
 
-    @staticmethod
-    def of(config: PoseConfig, views: ViewCounts, dims: int | None, token_size: int) -> Setting:
-        """`config` with descriptor size `dims`, or its own where None. Raises InvalidInput for a size that a reference cannot give."""
-        if dims is None:
-            return Setting(views, config, config.dims or token_size)
-        if not (0 < dims <= KEPT_COMPONENTS or dims == token_size):
-            raise InvalidInput("dims", f"expected 1 to {KEPT_COMPONENTS}, or {token_size} for whole tokens, found {dims}")
-        return Setting(views, replace(config, dims=None if dims == token_size else dims), dims)
+
+@dataclass(frozen=True)
+class Sweep:
+    """Which settings are run: every combination. An option left out is each variant's own."""
+
+    variants: Sequence[str]
+    views: Sequence[str]
+    """As in `ViewCounts.parse`. A variant for all views there are (`ucd+`) takes them all, once."""
+    dims: Sequence[int] | None = None
+    """Descriptor sizes."""
+    methods: Sequence[str] | None = None
+    """Of `core.correspond.METHODS`."""
+    consensus_deg: Sequence[float] | None = None
+    inlier_ratios: Sequence[float] | None = None
+    estimators: Sequence[str] | None = None
+    """Of `core.estimators.named.ESTIMATORS`."""
+
+    def settings(self, token_size: int) -> list[Setting]:
+        """In the order of the table. Raises InvalidInput for a name, a count or a size that does not exist."""
+        counts = [ViewCounts.parse(text) for text in self.views]
+        axes: list[Sequence[Any] | None] = [self.dims, self.methods, self.consensus_deg, self.inlier_ratios, self.estimators]
+        options = [PoseOptions(*each) for each in product(*(axis or [None] for axis in axes))]
+        settings = []
+        for variant in self.variants:
+            configs = [PoseConfig.named(variant, each) for each in options]
+            for count, config in product([ViewCounts.all()] if configs[0].all_views else counts, configs):
+                settings.append(Setting(count, config, component_count(config.dims, token_size) or token_size))
+        return settings
 
 
 @dataclass(frozen=True)
@@ -94,41 +114,35 @@ class PoseRow:
     """Median time of one estimate, one thread, features and reference already there."""
     memory_mb: float
     """Mean size of a reference's arrays."""
+    method: str
+    """How patches are matched."""
+    consensus_deg: float | None
+    """None where the variant has no consensus."""
+    inlier_ratio: float
+    estimator: str
 
 
 COLUMNS = tuple(field.name for field in fields(PoseRow))
-MEAN_COLUMNS = COLUMNS[COLUMNS.index("acc30") :]
+OPTIONS = COLUMNS[COLUMNS.index("method") :]
+"""Printed where they differ between rows."""
+MEAN_COLUMNS = COLUMNS[COLUMNS.index("acc30") : COLUMNS.index("method")]
 """What an "all" row averages over categories."""
 
 
-def run(
-    data: Path,
-    variants: Sequence[str],
-    views: Sequence[str],
-    limit: int | None,
-    json: Path | None,
-    seed: int = 0,
-    dims: Sequence[int] | None = None,
-    backbone: str = "dinov2-s14",
-) -> list[PoseRow]:
-    """Estimates the pairs of `data` under every variant, view count and descriptor size; prints and returns the table.
+def run(data: Path, sweep: Sweep, limit: int | None, json: Path | None, seed: int = 0, backbone: str = "dinov2-s14") -> list[PoseRow]:
+    """Estimates the pairs of `data` under every setting of `sweep`; prints and returns the table.
 
     Args:
-        views: counts as in `ViewCounts.parse`.
         limit: pairs a category at most; DEFAULT_LIMIT where None.
         json: where `{"meta", "rows"}` is written too.
-        dims: descriptor sizes; each variant's own where None.
 
-    Raises InvalidInput for an unknown variant, a bad view count, or data without pairs, ground truth or enough views.
+    Raises InvalidInput for a setting that does not exist, or data without pairs, ground truth or enough views.
     """
-    counts = [ViewCounts.parse(text) for text in views]
-    configs = [PoseConfig.named(variant) for variant in variants]
+    network = load_backbone(backbone)
+    settings = sweep.settings(network.dim)
     pairs = sample_pairs(folders.find_sequences(data), DEFAULT_LIMIT if limit is None else limit, seed)
     sequences = list(dict.fromkeys(sequence for pair in pairs for sequence in pair))
-    _require_views(sequences, counts)
-    network = load_backbone(backbone)
-    sizes: Sequence[int | None] = dims or [None]
-    settings = [Setting.of(config, count, size, network.dim) for config in configs for count in counts for size in sizes]
+    _require_views(sequences, [setting.views for setting in settings])
     encoded = encode_all(sequences, Encoder(network))
     files = {sequence.path: file for sequence, file in zip(sequences, encoded, strict=True)}
     jobs = [job for setting in settings for job in _jobs(setting, pairs, files, seed)]
@@ -144,12 +158,14 @@ def run(
             "limit": limit,
             "backbone": network.name,
             "fingerprint": network.fingerprint,
+            "options": asdict(sweep),
             "solve_seconds": seconds,
             "workers": worker_count(len(jobs)),
             "threads_per_worker": 1,
         }
         write_json(json, meta, [asdict(row) for row in rows])
-    print_table(f"Pose, {data}", [asdict(row) for row in rows], COLUMNS)
+    differing = [name for name in OPTIONS if len({getattr(row, name) for row in rows}) > 1]
+    print_table(f"Pose, {data}", [asdict(row) for row in rows], [*(name for name in COLUMNS if name not in OPTIONS), *differing])
     return rows
 
 
@@ -192,11 +208,15 @@ def _category_row(setting: Setting, category: str, results: Sequence[JobResult])
         median_log_scale=median(errors, "log_scale"),
         solve_ms=float(np.median([ms for result in results for ms in result.solve_ms])),
         memory_mb=float(np.mean([result.memory_mb for result in results])),
+        method=setting.config.method,
+        consensus_deg=setting.config.consensus_deg,
+        inlier_ratio=setting.config.inlier_ratio,
+        estimator=setting.config.estimator,
     )
 
 
 def _require_views(sequences: Sequence[folders.Sequence], counts: Sequence[ViewCounts]) -> None:
-    most = max(max(count.reference, count.target) for count in counts)
+    most = max(max(count.reference or 0, count.target or 0) for count in counts)
     for sequence in sequences:
         if len(sequence.images) < most:
             raise InvalidInput("views", f"{most} were asked for, but {sequence.name} has {len(sequence.images)}; ask for fewer")
@@ -209,7 +229,7 @@ def _jobs(setting: Setting, pairs: Sequence[Pair], files: dict[Path, Path], seed
     return [Job(setting, reference, tuple(group), files, seed) for reference, group in targets.items()]
 
 
-def _select(job: Job, sequence: folders.Sequence, role: str, count: int) -> EncodedBurst:
+def _select(job: Job, sequence: folders.Sequence, role: str, count: int | None) -> EncodedBurst:
     indices = choose_views(sequence.name, role, len(sequence.images), count, job.seed)
     return _cached(job.files[sequence.path]).select(indices)
 

@@ -5,7 +5,7 @@ Letters: M reference views, N target views, K correspondences, T transforms.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -15,21 +15,16 @@ from core.boxes import cloud_extent_m
 from core.clock import StageClock
 from core.correspond import METHODS
 from core.dense import DenseAgreement, DenseConfig
+from core.descriptors import KEPT_COMPONENTS
 from core.encode import EncodedBurst
 from core.errors import InvalidInput, NoPose
-from core.estimators.base import refit
-from core.estimators.ransac import ransac
-from core.hypotheses import HypothesesConfig, align_clouds, distinct, propose
+from core.estimators.named import ESTIMATORS
+from core.hypotheses import HypothesesConfig, distinct, propose
 from core.matched_pair import MatchedPair
-from core.matches import Alternative, Matches, PoseEstimate, among_all_patches, end_points, pool
+from core.matches import Alternative, PoseEstimate, among_all_patches, pool
 from core.reference import Reference
-from core.sim3 import Sim3
-from core.viewpoints import (
-    consensus,
-    mean_rotation,
-    near_their_mean,
-    view_agreement,
-)
+from core.solvers import by_consensus, by_retrieval, by_single_view, judge
+from core.viewpoints import view_agreement
 
 
 @dataclass(frozen=True)
@@ -67,36 +62,69 @@ class PoseConfig:
     """θ of the consensus; None leaves it out (variants without C)."""
     inlier_ratio: float = 0.08
     """Inlier threshold as a share of the target's extent."""
-    solver: Literal["retrieval", "umeyama", "agreement"] = "umeyama"
-    """From view pairs to a transform: the mean of their rotations, the paper's RANSAC, or ours over many hypotheses."""
+    estimator: str = "ransac"
+    """One of `core.estimators.named.ESTIMATORS`; of the solvers that fit correspondences."""
+    solver: Literal["retrieval", "single view", "umeyama", "agreement"] = "umeyama"
+    """From view pairs to a transform: the mean of their rotations, one pair alone, the paper's RANSAC, or ours over many hypotheses."""
+    all_views: bool = False
+    """Every view there is takes part, of reference and target: whoever chooses views asks this first."""
     best: BestConfig = field(default_factory=BestConfig)
     """Of the solver `agreement`."""
 
     def __post_init__(self) -> None:
-        if self.method not in METHODS:
-            raise InvalidInput("method", f"{self.method!r} is none of {', '.join(METHODS)}")
+        for name, value, known in (("method", self.method, METHODS), ("estimator", self.estimator, tuple(ESTIMATORS))):
+            if value not in known:
+                raise InvalidInput(name, f"{value!r} is none of {', '.join(known)}")
+        for name, number in (("dims", self.dims), ("consensus_deg", self.consensus_deg), ("inlier_ratio", self.inlier_ratio)):
+            if number is not None and not (np.isfinite(number) and number > 0):
+                raise InvalidInput(name, f"expected a positive number, found {number}")
 
     @staticmethod
-    def named(variant: str) -> PoseConfig:
-        """The config of a variant. Raises InvalidInput for an unknown name."""
+    def named(variant: str, options: PoseOptions | None = None) -> PoseConfig:
+        """The config of a variant, with options of the caller's own.
+
+        Raises InvalidInput for an unknown name and for an option that the variant makes no use of.
+        """
         if variant not in VARIANTS:
             raise InvalidInput("variant", f"{variant!r} is none of {', '.join(VARIANTS)}")
-        return VARIANTS[variant]
+        config = VARIANTS[variant]
+        chosen = {name: value for name, value in asdict(options or PoseOptions()).items() if value is not None}
+        if "consensus_deg" in chosen and config.consensus_deg is None:
+            raise InvalidInput("consensus_deg", f"variant {variant} has no consensus of view pairs; leave it out, or take one with a c")
+        if "estimator" in chosen and config.solver not in FITTING_SOLVERS:
+            raise InvalidInput("estimator", f"variant {variant} does not fit its correspondences; leave it out, or take one with a u")
+        return replace(config, **chosen)
+
+
+@dataclass(frozen=True)
+class PoseOptions:
+    """What may be set beside a variant's name; None leaves it as the variant has it. Fields as in `PoseConfig`."""
+
+    dims: int | None = None
+    """The token size itself keeps whole tokens."""
+    method: str | None = None
+    consensus_deg: float | None = None
+    inlier_ratio: float | None = None
+    estimator: str | None = None
+
+
+FITTING_SOLVERS = ("single view", "umeyama")
 
 
 _UCD = PoseConfig()
 VARIANTS = {
-    "best": replace(_UCD, variant="best", solver="agreement"),
+    "best": replace(_UCD, variant="best", consensus_deg=None, solver="agreement"),
     "ucd": _UCD,
-    "ucd+": replace(_UCD, variant="ucd+"),
+    "ucd+": replace(_UCD, variant="ucd+", all_views=True),
     "ud": replace(_UCD, variant="ud", consensus_deg=None),
     "uc": replace(_UCD, variant="uc", dims=None),
     "u": replace(_UCD, variant="u", dims=None, consensus_deg=None),
     "rc": replace(_UCD, variant="rc", dims=None, solver="retrieval"),
     "r": replace(_UCD, variant="r", dims=None, consensus_deg=None, solver="retrieval"),
+    "zsp": replace(_UCD, variant="zsp", dims=None, consensus_deg=None, solver="single view"),
 }
-"""`best` is ours; of the paper's letters (table 1), R is retrieval, U Umeyama, C consensus, D reduced
-descriptors, + all the views there are."""
+"""`best` is ours; of the paper's letters (table 1), R is retrieval, U Umeyama, C consensus, D reduced descriptors, + all the views
+there are. `zsp` is what it compares with, Goodwin 2022: one reference view and the target view most similar to it."""
 
 
 class PoseEstimator:
@@ -110,45 +138,24 @@ class PoseEstimator:
 
         Raises InvalidInput for tokens of another backbone or views without cameras or depth, NoPose where nothing fits.
         """
-        require_comparable(reference, target)
         clock, config = StageClock(), self.config
-        pair = MatchedPair(reference, target, config.dims, config.correspondences, config.method)
+        require_comparable(reference, target)
+        dims = component_count(config.dims, reference.basis.components.shape[1])
+        pair = MatchedPair(reference, target, dims, config.correspondences, config.method)
         clock.lap("match")
         threshold_m = self.config.inlier_ratio * cloud_extent_m(target.cloud_m)
-        solve = {"retrieval": self._by_retrieval, "umeyama": self._by_consensus, "agreement": self._by_agreement}[self.config.solver]
-        estimate = solve(pair, threshold_m, seed, clock)
+        estimate = self._solve(pair, threshold_m, seed, clock)
         return replace(estimate, matches=among_all_patches(estimate.matches, reference.views, target.views), stage_ms=clock.stage_ms)
 
-    def _by_retrieval(self, pair: MatchedPair, threshold_m: float, seed: int, clock: StageClock) -> PoseEstimate:
-        """The paper's R and RC: the mean rotation of the best view pairs, those far from it removed one by one with C (table 1).
-
-        The paper reports rotations only; scale and translation here make the clouds' extents and medians agree.
-        """
-        pairs = pair.best_pairs()
-        if not pairs:
-            raise NoPose("no view of the target resembles any view of the reference; send more views")
-        rotations = pair.rotations(pairs)
-        if self.config.consensus_deg is not None:
-            agree = near_their_mean(rotations, self.config.consensus_deg)
-            pairs, rotations = [each for each, kept in zip(pairs, agree) if kept], rotations[agree]
-        transform = align_clouds(mean_rotation(rotations)[None], *pair.clouds)[0]
-        matches, residual_m = _judge(pool(pair.found, pairs), transform, pair, threshold_m)
-        clock.lap("views")
-        return PoseEstimate(transform, matches, pair.similarity, tuple(pairs), residual_m)
-
-    def _by_consensus(self, pair: MatchedPair, threshold_m: float, seed: int, clock: StageClock) -> PoseEstimate:
-        """The paper's pipeline: best view pairs, consensus, RANSAC ("Viewpoint estimation", "Final pose estimation")."""
-        pairs = pair.best_pairs()
-        if self.config.consensus_deg is not None and pairs:
-            agree = consensus(pair.rotations(pairs), pair.similarities(pairs), self.config.consensus_deg, seed)
-            pairs = [each for each, kept in zip(pairs, agree) if kept]
-        clock.lap("views")
-        matches = pool(pair.found, pairs)
-        fit = ransac(*end_points(matches, pair.reference, pair.target), threshold_m, seed)
-        clock.lap("solve")
-        return PoseEstimate(
-            fit.target_from_reference, replace(matches, inlier=fit.inlier), pair.similarity, tuple(pairs), residual_m=fit.residual_m
-        )
+    def _solve(self, pair: MatchedPair, threshold_m: float, seed: int, clock: StageClock) -> PoseEstimate:
+        config = self.config
+        if config.solver == "retrieval":
+            return by_retrieval(pair, config.consensus_deg, threshold_m, clock)
+        if config.solver == "single view":
+            return by_single_view(pair, ESTIMATORS[config.estimator], threshold_m, seed, clock)
+        if config.solver == "umeyama":
+            return by_consensus(pair, config.consensus_deg, ESTIMATORS[config.estimator], threshold_m, seed, clock)
+        return self._by_agreement(pair, threshold_m, seed, clock)
 
     def _by_agreement(self, pair: MatchedPair, threshold_m: float, seed: int, clock: StageClock) -> PoseEstimate:
         """Ours: many hypotheses, the most promising refined, the one that lays the objects on each other best."""
@@ -170,17 +177,10 @@ class PoseEstimator:
         transform = polish.refine(refined.select(ranked[:1]))[0]
         clock.lap("polish")
         pairs = pair.best_pairs()
-        matches, residual_m = _judge(pool(pair.found, pairs), transform, pair, threshold_m)
+        matches, residual_m = judge(pool(pair.found, pairs), transform, pair, threshold_m)
         alternatives = tuple(Alternative(refined[index], float(scores[index])) for index in ranked[1:])
         score = float(scores[ranked[0]])
         return PoseEstimate(transform, matches, pair.similarity, tuple(pairs), residual_m, score=score, alternatives=alternatives)
-
-
-def _judge(matches: Matches, transform: Sim3, pair: MatchedPair, threshold_m: float) -> tuple[Matches, float]:
-    """Correspondences marked as inliers of a transform, and the inliers' residual."""
-    source, aim = end_points(matches, pair.reference, pair.target)
-    inlier = np.linalg.norm(transform.apply(source) - aim, axis=1) < threshold_m
-    return replace(matches, inlier=inlier), refit(source, aim, transform, inlier).residual_m
 
 
 def require_comparable(reference: Reference, target: EncodedBurst) -> None:
@@ -195,3 +195,12 @@ def require_comparable(reference: Reference, target: EncodedBurst) -> None:
             raise InvalidInput(f"views[{index}].K", "is missing: a pose needs K and world_from_camera for every view")
     if not len(target.cloud_m):
         raise InvalidInput("views", "no depth was measured on the object: a 7-D pose needs depth in at least one view")
+
+
+def component_count(dims: int | None, token_size: int) -> int | None:
+    """`dims`, or None where that means whole tokens. Raises InvalidInput for more components than a reference keeps."""
+    if dims is None or dims == token_size:
+        return None
+    if dims > KEPT_COMPONENTS:
+        raise InvalidInput("dims", f"expected 1 to {KEPT_COMPONENTS}, or {token_size} for whole tokens, found {dims}")
+    return dims

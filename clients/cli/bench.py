@@ -20,17 +20,23 @@ BACKBONE = "dinov2-s14"
 def pose(
     data: Data,
     variant: Annotated[list[str], typer.Option(help="Variant of the pose pipeline; may be repeated.")] = ["ucd"],  # noqa: B006
-    views: Annotated[list[str], typer.Option(help="Views of reference and target, 10 or 10+3; may be repeated.")] = ["10"],  # noqa: B006
+    views: Annotated[list[str], typer.Option(help="Views of reference and target: 10, 10+3 or all; may be repeated.")] = ["10"],  # noqa: B006
     limit: Annotated[int | None, typer.Option(min=1, help="Pairs a category at most.")] = None,
-    dims: Annotated[list[int] | None, typer.Option(help="Descriptor size; the variant's own where left out.")] = None,
+    dims: Annotated[list[int] | None, typer.Option(help="Descriptor size; the variant's own where left out; may be repeated.")] = None,
+    method: Annotated[
+        list[str] | None, typer.Option(help="Correspondences: nearest, mutual, cyclical or cyclical-3d; may be repeated.")
+    ] = None,
+    consensus: Annotated[list[float] | None, typer.Option(help="Angle of the consensus, degrees; may be repeated.")] = None,
+    inlier: Annotated[list[float] | None, typer.Option(help="Inlier threshold as a share of the extent; may be repeated.")] = None,
+    estimator: Annotated[list[str] | None, typer.Option(help="Robust estimator: ransac or pycolmap; may be repeated.")] = None,
     seed: Seed = 0,
     backbone: Backbone = BACKBONE,
     json: JsonFile = None,
 ) -> None:
     """Accuracy of the 7-D pose between objects of a category."""
-    from benchmarks.pose import run
+    from benchmarks.pose import Sweep, run
 
-    run(data, variant, views, limit, json, seed, dims, backbone)
+    run(data, Sweep(variant, views, dims, method, consensus, inlier, estimator), limit, json, seed, backbone)
 
 
 @app.command()

@@ -12,6 +12,7 @@ import pytest
 
 from benchmarks import parallel, pose
 from benchmarks.pairs import ViewCounts
+from benchmarks.pose import Sweep
 from clients.datasets.folders import find_sequences
 from clients.pose_error import NO_POSE, PoseError
 from core.errors import InvalidInput, NoPose
@@ -20,6 +21,7 @@ from core.pose import PoseConfig, PoseEstimator
 COLUMNS = {
     *("variant", "views", "dims", "category", "pairs", "acc30", "acc15", "acc7_5"),
     *("median_deg", "median_t", "median_log_scale", "solve_ms", "memory_mb"),
+    *("method", "consensus_deg", "inlier_ratio", "estimator"),
 }
 
 
@@ -33,7 +35,7 @@ def small_world(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, backbone) -> No
 
 def test_a_known_similarity_is_recovered(recorded: Path, tmp_path: Path) -> None:
     file = tmp_path / "out" / "pose.json"
-    pose.run(recorded, ["ucd"], ["4"], 1, file)
+    pose.run(recorded, Sweep(["ucd"], ["4"]), 1, file)
     written = json.loads(file.read_text())
     category, everything = written["rows"]
     assert set(category) == COLUMNS
@@ -46,7 +48,7 @@ def test_a_known_similarity_is_recovered(recorded: Path, tmp_path: Path) -> None
 
 
 def test_the_same_seed_gives_the_same_figures(recorded: Path) -> None:
-    first, again = (pose.run(recorded, ["ucd"], ["3+2"], 1, None, seed=5)[0] for _ in range(2))
+    first, again = (pose.run(recorded, Sweep(["ucd"], ["3+2"]), 1, None, seed=5)[0] for _ in range(2))
     assert replace(first, solve_ms=0) == replace(again, solve_ms=0)
 
 
@@ -54,25 +56,56 @@ def test_a_job_and_its_result_can_travel_between_processes(recorded: Path, monke
     def travelled(function, jobs, *_: object) -> list[object]:
         return [pickle.loads(pickle.dumps(function(pickle.loads(pickle.dumps(job))))) for job in jobs]
 
-    here = pose.run(recorded, ["ucd"], ["4"], 1, None)
+    here = pose.run(recorded, Sweep(["ucd"], ["4"]), 1, None)
     monkeypatch.setattr(pose, "map_jobs", travelled)
-    there = pose.run(recorded, ["ucd"], ["4"], 1, None)
+    there = pose.run(recorded, Sweep(["ucd"], ["4"]), 1, None)
     assert [replace(row, solve_ms=0) for row in there] == [replace(row, solve_ms=0) for row in here]
 
 
 def test_descriptor_sizes(recorded: Path) -> None:
-    rows = pose.run(recorded, ["ucd"], ["4"], 1, None, dims=[6, 64])
+    rows = pose.run(recorded, Sweep(["ucd"], ["4"], dims=[6, 64]), 1, None)
     assert [row.dims for row in rows] == [6, 6, 64, 64]
+
+
+def test_options_multiply_and_are_in_every_row(recorded: Path, tmp_path: Path) -> None:
+    sweep = Sweep(["ucd"], ["4"], methods=["mutual", "cyclical"], consensus_deg=[15.0], inlier_ratios=[0.05], estimators=["ransac"])
+    pose.run(recorded, sweep, 1, tmp_path / "pose.json")
+    rows = json.loads((tmp_path / "pose.json").read_text())["rows"]
+    assert [row["method"] for row in rows] == ["mutual", "mutual", "cyclical", "cyclical"]
+    assert {(row["consensus_deg"], row["inlier_ratio"], row["estimator"]) for row in rows} == {(15.0, 0.05, "ransac")}
+
+
+def test_plus_takes_all_views_of_both_whatever_is_asked_of_the_others(recorded: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    seen = []
+    estimate = PoseEstimator.estimate
+
+    def watched(self, reference, target, *, seed: int = 0):
+        seen.append((self.config.variant, len(reference.views), len(target.views)))
+        return estimate(self, reference, target, seed=seed)
+
+    monkeypatch.setattr(PoseEstimator, "estimate", watched)
+    rows = pose.run(recorded, Sweep(["ucd", "ucd+"], ["3", "3+2"]), 1, None)
+    assert seen == [("ucd", 3, 3), ("ucd", 3, 2), ("ucd+", 4, 4)]
+    assert [row.views for row in rows if row.category == "all"] == ["3", "3+2", "all"]
 
 
 @pytest.mark.parametrize(
     ("change", "field"),
-    [({"variants": ["nonsense"]}, "variant"), ({"views": ["9"]}, "views"), ({"views": ["many"]}, "views"), ({"dims": [65]}, "dims")],
+    [
+        ({"variants": ["nonsense"]}, "variant"),
+        ({"views": ["9"]}, "views"),
+        ({"views": ["many"]}, "views"),
+        ({"dims": [65]}, "dims"),
+        ({"methods": ["psychic"]}, "method"),
+        ({"estimators": ["luck"]}, "estimator"),
+        ({"inlier_ratios": [0.0]}, "inlier_ratio"),
+        ({"variants": ["u"], "consensus_deg": [15.0]}, "consensus_deg"),
+    ],
 )
 def test_what_cannot_be_run_is_said_with_its_field(recorded: Path, change: dict[str, object], field: str) -> None:
-    given = {"variants": ["ucd"], "views": ["4"], "dims": None} | change
+    given = {"variants": ["ucd"], "views": ["4"]} | change
     with pytest.raises(InvalidInput) as caught:
-        pose.run(recorded, limit=1, json=None, **given)
+        pose.run(recorded, Sweep(**given), limit=1, json=None)
     assert caught.value.field == field
 
 
@@ -81,7 +114,7 @@ def test_a_refused_pose_counts_as_180(recorded: Path, tmp_path: Path, monkeypatc
         raise NoPose("nothing fits")
 
     monkeypatch.setattr(PoseEstimator, "estimate", refuse)
-    (row, _) = pose.run(recorded, ["ucd"], ["4"], 1, tmp_path / "pose.json")
+    (row, _) = pose.run(recorded, Sweep(["ucd"], ["4"]), 1, tmp_path / "pose.json")
     assert (row.acc30, row.median_deg) == (0, 180)
     assert json.loads((tmp_path / "pose.json").read_text())["rows"][0]["median_t"] is None
 

@@ -10,7 +10,7 @@ import pytest
 from core.correspond import METHODS
 from core.encode import EncodedBurst
 from core.errors import InvalidInput, TooFewViews
-from core.pose import VARIANTS, PoseConfig, PoseEstimator
+from core.pose import VARIANTS, PoseConfig, PoseEstimator, PoseOptions
 from core.reference import Reference, build_reference
 from core.sim3 import Sim3, rotation_angle_deg
 
@@ -43,6 +43,53 @@ def test_every_way_to_match(method: str, painted: PaintedObject, moved: Sim3) ->
     reference = build_reference(painted.encode(6, Sim3.identity()))
     estimate = PoseEstimator(PoseConfig(method=method)).estimate(reference, painted.encode(5, moved))
     assert_recovered(estimate.target_from_reference, moved)
+
+
+@pytest.mark.parametrize("estimator", ["ransac", "pycolmap"])
+@pytest.mark.parametrize("dims", [48, 32, 24, 6, 3])
+def test_every_descriptor_size_and_estimator(dims: int, estimator: str, painted: PaintedObject, moved: Sim3) -> None:
+    config = PoseConfig.named("ucd", PoseOptions(dims=dims, estimator=estimator, consensus_deg=15, inlier_ratio=0.05))
+    assert (config.dims, config.estimator, config.consensus_deg, config.inlier_ratio) == (dims, estimator, 15, 0.05)
+    estimate = PoseEstimator(config).estimate(build_reference(painted.encode(6, Sim3.identity())), painted.encode(5, moved))
+    assert_recovered(estimate.target_from_reference, moved)
+
+
+def test_whole_tokens_by_their_size_or_by_none_are_the_same(painted: PaintedObject, moved: Sim3) -> None:
+    reference, target = build_reference(painted.encode(4, Sim3.identity())), painted.encode(3, moved)
+    by_size, by_none = (PoseEstimator(PoseConfig(dims=dims)).estimate(reference, target) for dims in (48, None))
+    assert np.array_equal(by_size.target_from_reference.as_matrix(), by_none.target_from_reference.as_matrix())
+
+
+@pytest.mark.parametrize(
+    ("variant", "options"),
+    [
+        ("u", PoseOptions(consensus_deg=15)),
+        ("best", PoseOptions(consensus_deg=15)),
+        ("best", PoseOptions(estimator="pycolmap")),
+        ("r", PoseOptions(estimator="ransac")),
+        ("ucd", PoseOptions(inlier_ratio=-1)),
+        ("ucd", PoseOptions(method="psychic")),
+        ("ucd", PoseOptions(estimator="luck")),
+        ("ucd", PoseOptions(dims=0)),
+    ],
+)
+def test_an_option_without_effect_or_sense_is_refused_by_its_name(variant: str, options: PoseOptions) -> None:
+    (name,) = (name for name, value in vars(options).items() if value is not None)
+    with pytest.raises(InvalidInput) as caught:
+        PoseConfig.named(variant, options)
+    assert caught.value.field == name
+
+
+def test_more_components_than_are_kept_are_refused(painted: PaintedObject) -> None:
+    with pytest.raises(InvalidInput, match="48 for whole tokens, found 65"):
+        PoseEstimator(PoseConfig(dims=65)).estimate(build_reference(painted.encode(3, Sim3.identity())), painted.encode(2, Sim3.identity()))
+
+
+def test_zsp_uses_one_view_of_each(painted: PaintedObject, moved: Sim3) -> None:
+    reference, target = build_reference(painted.encode(5, Sim3.identity())), painted.encode(4, moved)
+    estimate = PoseEstimator(PoseConfig.named("zsp")).estimate(reference, target)
+    assert estimate.pairs == ((0, int(estimate.view_similarity[0].argmax())),)
+    assert set(estimate.matches.reference_view) == {0}
 
 
 def test_the_seed_decides_everything(painted: PaintedObject, moved: Sim3) -> None:

@@ -1,0 +1,26 @@
+"""COLMAP's robust similarity (LO-RANSAC on three points) in place of ours; needs the extra `colmap`."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from core.errors import NoPose, Unavailable
+from core.estimators.base import MIN_CORRESPONDENCES, FloatArray, RobustFit, refit
+from core.sim3 import Sim3
+
+
+def lo_ransac(source: FloatArray, target: FloatArray, threshold_m: float, seed: int) -> RobustFit:
+    """The similarity that `pycolmap.estimate_sim3d_robust` finds. See `Estimator`; raises Unavailable where pycolmap is not installed."""
+    try:
+        import pycolmap
+    except ImportError as error:
+        raise Unavailable("estimator 'pycolmap' needs pycolmap, which is not installed: pip install 'onelook[colmap]'") from error
+    if len(source) < MIN_CORRESPONDENCES:
+        raise NoPose(f"{len(source)} correspondences with measured depth; at least {MIN_CORRESPONDENCES} are needed: send more views")
+    options = pycolmap.RANSACOptions(max_error=threshold_m, random_seed=seed)
+    found = pycolmap.estimate_sim3d_robust(np.asarray(source, dtype=np.float64), np.asarray(target, dtype=np.float64), options)
+    if found is None or found["num_inliers"] < MIN_CORRESPONDENCES:
+        raise NoPose(f"no {MIN_CORRESPONDENCES} of {len(source)} correspondences agree on a transform; are these objects of one kind?")
+    similarity = found["tgt_from_src"]
+    transform = Sim3(float(similarity.scale), np.asarray(similarity.rotation.matrix()), np.asarray(similarity.translation))
+    return refit(source, target, transform, np.linalg.norm(transform.apply(source) - target, axis=1) < threshold_m)

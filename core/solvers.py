@@ -1,0 +1,73 @@
+"""From view pairs to a transform, as the paper and the work it compares with do it.
+
+Letters: M reference views, N target views, Q view pairs, K correspondences.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from core.clock import StageClock
+from core.errors import NoPose
+from core.estimators.base import Estimator, refit
+from core.hypotheses import align_clouds
+from core.matched_pair import MatchedPair, Pairs
+from core.matches import Matches, PoseEstimate, end_points, pool
+from core.sim3 import Sim3
+from core.viewpoints import consensus, mean_rotation, near_their_mean
+
+
+def by_retrieval(pair: MatchedPair, consensus_deg: float | None, threshold_m: float, clock: StageClock) -> PoseEstimate:
+    """R and RC: the mean rotation of the best view pairs, with C those far from it removed one by one (paper, table 1).
+
+    The paper reports rotations only; scale and translation here make the clouds' extents and medians agree.
+    """
+    pairs = pair.best_pairs()
+    if not pairs:
+        raise NoPose("no view of the target resembles any view of the reference; send more views")
+    rotations = pair.rotations(pairs)
+    if consensus_deg is not None:
+        agree = near_their_mean(rotations, consensus_deg)
+        pairs, rotations = [each for each, kept in zip(pairs, agree) if kept], rotations[agree]
+    transform = align_clouds(mean_rotation(rotations)[None], *pair.clouds)[0]
+    matches, residual_m = judge(pool(pair.found, pairs), transform, pair, threshold_m)
+    clock.lap("views")
+    return PoseEstimate(transform, matches, pair.similarity, tuple(pairs), residual_m)
+
+
+def by_consensus(
+    pair: MatchedPair, consensus_deg: float | None, fit: Estimator, threshold_m: float, seed: int, clock: StageClock
+) -> PoseEstimate:
+    """U, with C where there is an angle: best view pairs, consensus, RANSAC ("Viewpoint estimation", "Final pose estimation")."""
+    pairs = pair.best_pairs()
+    if consensus_deg is not None and pairs:
+        agree = consensus(pair.rotations(pairs), pair.similarities(pairs), consensus_deg, seed)
+        pairs = [each for each, kept in zip(pairs, agree) if kept]
+    clock.lap("views")
+    return _fitted(pair, pairs, fit, threshold_m, seed, clock)
+
+
+def by_single_view(pair: MatchedPair, fit: Estimator, threshold_m: float, seed: int, clock: StageClock) -> PoseEstimate:
+    """Goodwin 2022, which the paper compares with ("Multi-view one-shot pose estimation"): the reference's first view that shows the
+    object, the target view most similar to it, and nothing else."""
+    rows = np.flatnonzero(pair.similarity.max(axis=1) > 0)
+    pairs = [(int(rows[0]), int(pair.similarity[rows[0]].argmax()))] if len(rows) else []
+    clock.lap("views")
+    return _fitted(pair, pairs, fit, threshold_m, seed, clock)
+
+
+def _fitted(pair: MatchedPair, pairs: Pairs, fit: Estimator, threshold_m: float, seed: int, clock: StageClock) -> PoseEstimate:
+    matches = pool(pair.found, pairs)
+    found = fit(*end_points(matches, pair.reference, pair.target), threshold_m, seed)
+    clock.lap("solve")
+    marked = replace(matches, inlier=found.inlier)
+    return PoseEstimate(found.target_from_reference, marked, pair.similarity, tuple(pairs), found.residual_m)
+
+
+def judge(matches: Matches, transform: Sim3, pair: MatchedPair, threshold_m: float) -> tuple[Matches, float]:
+    """Correspondences marked as inliers of a transform, and the inliers' residual."""
+    source, aim = end_points(matches, pair.reference, pair.target)
+    inlier = np.linalg.norm(transform.apply(source) - aim, axis=1) < threshold_m
+    return replace(matches, inlier=inlier), refit(source, aim, transform, inlier).residual_m
