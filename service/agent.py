@@ -13,7 +13,7 @@ from core.novelty import Decision, decide, named_score
 from core.packing import burst_from_arrays
 from core.pose import PoseConfig, PoseEstimator
 from core.reference import MIN_VIEWS, Reference, build_reference
-from core.scan import DEFAULT_VIEWPOINTS, ScanRequest, request_scan
+from core.scan import DEFAULT_VIEWPOINTS, ScanOptions, ScanRequest, request_scan
 from core.views import Burst
 from service.features import best_pair, features_as_arrays
 from store.memory import Memory
@@ -103,8 +103,8 @@ class Agent:
         Raises InvalidInput where cameras or depth are missing, NoObject, NotFound.
         """
         if isinstance(source, str):
-            return self.memory.scans.create(request_scan(self.encoded(source), self.config.scan_views), source)
-        return self.memory.scans.create(request_scan(self._encoder.encode(source), self.config.scan_views))
+            return self.memory.scans.create(request_scan(self.encoded(source), ScanOptions(self.config.scan_views)), source)
+        return self.memory.scans.create(request_scan(self._encoder.encode(source), ScanOptions(self.config.scan_views)))
 
     def add_views(self, scan_id: str, burst: Burst) -> Scan:
         """Keeps views for a scan. Raises NotFound, Conflict where it is completed, InvalidInput for views without camera or depth."""
@@ -144,7 +144,7 @@ class Agent:
 
     def _scan_or_reason(self, encoded: EncodedBurst) -> tuple[ScanRequest | None, str | None]:
         try:
-            return request_scan(encoded, self.config.scan_views), None
+            return request_scan(encoded, ScanOptions(self.config.scan_views)), None
         except InvalidInput as error:
             return None, str(error)
 

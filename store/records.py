@@ -98,8 +98,8 @@ class Observation:
 
 def request_to_json(request: ScanRequest) -> str:
     """One TEXT column."""
-    fields = {"center_m": request.center_m, "up": request.up, "radius_m": request.radius_m, "world_from_camera": request.world_from_camera}
-    return json.dumps({name: np.asarray(value).tolist() for name, value in fields.items()})
+    arrays = {name: getattr(request, name).tolist() for name in ("center_m", "up", "world_from_camera", "excluded")}
+    return json.dumps(arrays | {"radius_m": request.radius_m, "extent_m": request.extent_m, "up_from": request.up_from})
 
 
 def request_from_json(text: str) -> ScanRequest:
@@ -110,6 +110,9 @@ def request_from_json(text: str) -> ScanRequest:
         up=np.array(fields["up"]),
         radius_m=fields["radius_m"],
         world_from_camera=np.array(fields["world_from_camera"]),
+        extent_m=fields.get("extent_m", fields["radius_m"] / 2),
+        up_from=fields.get("up_from", "cameras"),
+        excluded=np.array(fields.get("excluded", ())).reshape(-1, 4, 4),
     )
 
 

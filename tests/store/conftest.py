@@ -82,4 +82,4 @@ def reference(encoded: EncodedBurst) -> Reference:
 @pytest.fixture
 def request_for_views() -> ScanRequest:
     """Two viewpoints."""
-    return ScanRequest(np.array([0.1, 0.2, 0.3]), np.array([0.0, 0.0, 1.0]), 0.8, np.stack([np.eye(4)] * 2))
+    return ScanRequest(np.array([0.1, 0.2, 0.3]), np.array([0.0, 0.0, 1.0]), 0.8, np.stack([np.eye(4)] * 2), 0.4)
