@@ -49,9 +49,7 @@ def test_the_reported_age_is_the_lag_of_an_object_that_turns_steadily() -> None:
     track, frames, per_frame_deg = Track(), 60, 2.0
     config = replace(CONFIG, weight=0.25)
     for frame in range(frames):  # each estimate is of the moment itself
-        track = seen(
-            track, [turned(per_frame_deg * frame)], center_m=CENTER, diameter_m=0.2, age_s=0.0, elapsed_s=0.1, config=config
-        )
+        track = seen(track, [turned(per_frame_deg * frame)], center_m=CENTER, diameter_m=0.2, age_s=0.0, elapsed_s=0.1, config=config)
     assert track.pose is not None
     behind_deg = float(rotation_angle_deg(track.pose.rotation, turned(per_frame_deg * (frames - 1)).rotation))
     assert behind_deg / per_frame_deg * 0.1 == pytest.approx(track.data_age_s, rel=0.01)
