@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.box_iou import Parallelepiped, box_iou
 from benchmarks.encoded import encode_all, read_encoded
 from benchmarks.pairs import Pair, ViewCounts, choose_views, sample_pairs
 from benchmarks.parallel import map_jobs, worker_count
@@ -24,10 +25,13 @@ from benchmarks.tables import print_table, write_json
 from clients.datasets import folders
 from clients.pose_error import NO_POSE, PoseError, accuracy, median, pose_error
 from core.backbones.dino import load_backbone
+from core.boxes import remove_outliers
 from core.encode import EncodedBurst, Encoder
 from core.errors import InvalidInput, NoPose
+from core.matches import PoseEstimate
 from core.pose import PoseConfig, PoseEstimator, PoseOptions, component_count
 from core.reference import Reference, build_reference
+from core.sim3 import Sim3
 
 DEFAULT_LIMIT = 30
 """Pairs a category."""
@@ -58,11 +62,13 @@ class Sweep:
     inlier_ratios: Sequence[float] | None = None
     estimators: Sequence[str] | None = None
     """Of `core.estimators.named.ESTIMATORS`."""
+    dof: Sequence[int] | None = None
+    """7 or 9."""
 
     def settings(self, token_size: int) -> list[Setting]:
         """In the order of the table. Raises InvalidInput for a name, a count or a size that does not exist."""
         counts = [ViewCounts.parse(text) for text in self.views]
-        axes: list[Sequence[Any] | None] = [self.dims, self.methods, self.consensus_deg, self.inlier_ratios, self.estimators]
+        axes: list[Sequence[Any] | None] = [self.dims, self.methods, self.consensus_deg, self.inlier_ratios, self.estimators, self.dof]
         options = [PoseOptions(*each) for each in product(*(axis or [None] for axis in axes))]
         settings = []
         for variant in self.variants:
@@ -86,10 +92,13 @@ class Job:
 
 @dataclass(frozen=True)
 class JobResult:
-    """Errors and solve times of a job's targets, in order, and the size of its reference."""
+    """What came of a job's targets, in order, and the size of its reference."""
 
     job: Job
     errors: tuple[PoseError, ...]
+    ious: tuple[float, ...]
+    dofs: tuple[int, ...]
+    """0 for a refused pose."""
     solve_ms: tuple[float, ...]
     memory_mb: float
 
@@ -110,16 +119,21 @@ class PoseRow:
     median_t: float
     """Fraction of the target's diagonal."""
     median_log_scale: float
+    median_iou: float
+    """Of the box around the reference, carried by the estimate, and the target's, percent; both along the model's axes."""
     solve_ms: float
     """Median time of one estimate, one thread, features and reference already there."""
     memory_mb: float
     """Mean size of a reference's arrays."""
+    answered: float
+    """Percentage that got a pose, of as many degrees of freedom as asked for."""
     method: str
     """How patches are matched."""
     consensus_deg: float | None
     """None where the variant has no consensus."""
     inlier_ratio: float
     estimator: str
+    dof: int
 
 
 COLUMNS = tuple(field.name for field in fields(PoseRow))
@@ -174,13 +188,18 @@ def solve(job: Job) -> JobResult:
     arrays = build_reference(_select(job, job.reference, "reference", job.setting.views.reference)).as_arrays()
     reference = Reference.from_arrays(arrays)  # as the memory keeps it
     estimator = PoseEstimator(job.setting.config)
-    errors, solve_ms = [], []
+    scores, solve_ms = [], []
     for sequence in job.targets:
         target = _select(job, sequence, "target", job.setting.views.target)
         started = time.perf_counter()
-        errors.append(_estimate(estimator, reference, target, job, sequence))
+        try:
+            estimate = estimator.estimate(reference, target, seed=job.seed)
+        except NoPose:
+            estimate = None
         solve_ms.append(1000 * (time.perf_counter() - started))
-    return JobResult(job, tuple(errors), tuple(solve_ms), sum(array.nbytes for array in arrays.values()) / 1e6)
+        scores.append(_score(estimate, reference, job, sequence))
+    errors, ious, dofs = zip(*scores, strict=True)
+    return JobResult(job, errors, ious, dofs, tuple(solve_ms), sum(array.nbytes for array in arrays.values()) / 1e6)
 
 
 def table_rows(setting: Setting, results: Sequence[JobResult]) -> list[PoseRow]:
@@ -206,12 +225,15 @@ def _category_row(setting: Setting, category: str, results: Sequence[JobResult])
         median_deg=median(errors, "rotation_deg"),
         median_t=median(errors, "translation"),
         median_log_scale=median(errors, "log_scale"),
+        median_iou=100 * float(np.median([iou for result in results for iou in result.ious])),
         solve_ms=float(np.median([ms for result in results for ms in result.solve_ms])),
         memory_mb=float(np.mean([result.memory_mb for result in results])),
+        answered=100 * float(np.mean([dof == setting.config.dof for result in results for dof in result.dofs])),
         method=setting.config.method,
         consensus_deg=setting.config.consensus_deg,
         inlier_ratio=setting.config.inlier_ratio,
         estimator=setting.config.estimator,
+        dof=setting.config.dof,
     )
 
 
@@ -237,12 +259,20 @@ def _select(job: Job, sequence: folders.Sequence, role: str, count: int | None) 
 _cached = lru_cache(maxsize=16)(read_encoded)
 
 
-def _estimate(estimator: PoseEstimator, reference: Reference, target: EncodedBurst, job: Job, sequence: folders.Sequence) -> PoseError:
+def _score(estimate: PoseEstimate | None, reference: Reference, job: Job, sequence: folders.Sequence) -> tuple[PoseError, float, int]:
+    """Errors, IoU of the boxes, and degrees of freedom, against ground truth."""
     reference_from_model, target_from_model = job.reference.world_from_model, sequence.world_from_model
     assert reference_from_model, "sample_pairs requires ground truth"
     assert target_from_model, "sample_pairs requires ground truth"
-    try:
-        estimate = estimator.estimate(reference, target, seed=job.seed)
-    except NoPose:
-        return NO_POSE
-    return pose_error(estimate.target_from_reference, reference_from_model, target_from_model, sequence.symmetries)
+    if estimate is None:
+        return NO_POSE, 0.0, 0
+    error = pose_error(estimate.target_from_reference, reference_from_model, target_from_model, sequence.symmetries)
+    truth = _model_box(job, sequence, target_from_model)
+    found = _model_box(job, job.reference, reference_from_model).carried_by(estimate.matrix(reference.box))
+    return error, box_iou(found, truth), 7 if estimate.target_from_object is None else 9
+
+
+def _model_box(job: Job, sequence: folders.Sequence, world_from_model: Sim3) -> Parallelepiped:
+    """Around all that was measured of an object, along its model's axes, in its world."""
+    cloud = remove_outliers(_cached(job.files[sequence.path]).cloud_m)
+    return Parallelepiped.around(world_from_model.inverse().apply(cloud)).carried_by(world_from_model.as_matrix())

@@ -11,6 +11,7 @@ import numpy as np
 import open3d as o3d
 from numpy.typing import NDArray
 
+from core.affine9 import Affine9
 from core.errors import NoObject
 from core.sim3 import Sim3
 
@@ -37,6 +38,12 @@ class OrientedBox:
         moved[:3, :3] = target_from_reference.rotation @ self.world_from_object[:3, :3]
         moved[:3, 3] = target_from_reference.apply(self.world_from_object[:3, 3])
         return OrientedBox(moved, self.extent_m * target_from_reference.scale)
+
+    def stretched_by(self, target_from_object: Affine9) -> OrientedBox:
+        """The box on the target, for a transform of its own frame with a scale for each axis."""
+        moved = np.eye(4)
+        moved[:3, :3], moved[:3, 3] = target_from_object.rotation, target_from_object.translation
+        return OrientedBox(moved, self.extent_m * target_from_object.scales)
 
 
 BOX_EDGES = tuple((a, a | 1 << axis) for a in range(8) for axis in range(3) if not a & 1 << axis)

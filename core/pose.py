@@ -23,7 +23,7 @@ from core.hypotheses import HypothesesConfig, distinct, propose
 from core.matched_pair import MatchedPair
 from core.matches import Alternative, PoseEstimate, among_all_patches, pool
 from core.reference import Reference
-from core.solvers import by_consensus, by_retrieval, by_single_view, judge
+from core.solvers import by_consensus, by_retrieval, by_single_view, judge, with_axis_scales
 from core.viewpoints import view_agreement
 
 
@@ -66,6 +66,8 @@ class PoseConfig:
     """One of `core.estimators.named.ESTIMATORS`; of the solvers that fit correspondences."""
     solver: Literal["retrieval", "single view", "umeyama", "agreement"] = "umeyama"
     """From view pairs to a transform: the mean of their rotations, one pair alone, the paper's RANSAC, or ours over many hypotheses."""
+    dof: int = 7
+    """9 for a scale of each axis of the object's frame, fitted to the inliers of the 7-D transform."""
     all_views: bool = False
     """Every view there is takes part, of reference and target: whoever chooses views asks this first."""
     best: BestConfig = field(default_factory=BestConfig)
@@ -75,6 +77,8 @@ class PoseConfig:
         for name, value, known in (("method", self.method, METHODS), ("estimator", self.estimator, tuple(ESTIMATORS))):
             if value not in known:
                 raise InvalidInput(name, f"{value!r} is none of {', '.join(known)}")
+        if self.dof not in (7, 9):
+            raise InvalidInput("dof", f"expected 7 or 9, found {self.dof}")
         for name, number in (("dims", self.dims), ("consensus_deg", self.consensus_deg), ("inlier_ratio", self.inlier_ratio)):
             if number is not None and not (np.isfinite(number) and number > 0):
                 raise InvalidInput(name, f"expected a positive number, found {number}")
@@ -106,6 +110,7 @@ class PoseOptions:
     consensus_deg: float | None = None
     inlier_ratio: float | None = None
     estimator: str | None = None
+    dof: int | None = None
 
 
 FITTING_SOLVERS = ("single view", "umeyama")
@@ -145,6 +150,9 @@ class PoseEstimator:
         clock.lap("match")
         threshold_m = self.config.inlier_ratio * cloud_extent_m(target.cloud_m)
         estimate = self._solve(pair, threshold_m, seed, clock)
+        if config.dof == 9:
+            estimate = with_axis_scales(estimate, pair, reference.box, threshold_m)
+            clock.lap("axis scales")
         return replace(estimate, matches=among_all_patches(estimate.matches, reference.views, target.views), stage_ms=clock.stage_ms)
 
     def _solve(self, pair: MatchedPair, threshold_m: float, seed: int, clock: StageClock) -> PoseEstimate:

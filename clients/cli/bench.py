@@ -29,6 +29,7 @@ def pose(
     consensus: Annotated[list[float] | None, typer.Option(help="Angle of the consensus, degrees; may be repeated.")] = None,
     inlier: Annotated[list[float] | None, typer.Option(help="Inlier threshold as a share of the extent; may be repeated.")] = None,
     estimator: Annotated[list[str] | None, typer.Option(help="Robust estimator: ransac or pycolmap; may be repeated.")] = None,
+    dof: Annotated[list[int] | None, typer.Option(help="7, or 9 with a scale for each axis; may be repeated.")] = None,
     seed: Seed = 0,
     backbone: Backbone = BACKBONE,
     json: JsonFile = None,
@@ -36,7 +37,7 @@ def pose(
     """Accuracy of the 7-D pose between objects of a category."""
     from benchmarks.pose import Sweep, run
 
-    run(data, Sweep(variant, views, dims, method, consensus, inlier, estimator), limit, json, seed, backbone)
+    run(data, Sweep(variant, views, dims, method, consensus, inlier, estimator, dof), limit, json, seed, backbone)
 
 
 @app.command()

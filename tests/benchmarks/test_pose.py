@@ -17,11 +17,14 @@ from clients.datasets.folders import find_sequences
 from clients.pose_error import NO_POSE, PoseError
 from core.errors import InvalidInput, NoPose
 from core.pose import PoseConfig, PoseEstimator
+from core.sim3 import Sim3
+
+from .conftest import record
 
 COLUMNS = {
     *("variant", "views", "dims", "category", "pairs", "acc30", "acc15", "acc7_5"),
-    *("median_deg", "median_t", "median_log_scale", "solve_ms", "memory_mb"),
-    *("method", "consensus_deg", "inlier_ratio", "estimator"),
+    *("median_deg", "median_t", "median_log_scale", "median_iou", "solve_ms", "memory_mb", "answered"),
+    *("method", "consensus_deg", "inlier_ratio", "estimator", "dof"),
 }
 
 
@@ -65,6 +68,15 @@ def test_a_job_and_its_result_can_travel_between_processes(recorded: Path, monke
 def test_descriptor_sizes(recorded: Path) -> None:
     rows = pose.run(recorded, Sweep(["ucd"], ["4"], dims=[6, 64]), 1, None)
     assert [row.dims for row in rows] == [6, 6, 64, 64]
+
+
+def test_nine_degrees_fit_a_box_that_seven_do_not(tmp_path: Path, ellipsoid) -> None:
+    for name, half_axes in (("long", [0.36, 0.3, 0.3]), ("short", [0.3, 0.3, 0.3])):
+        record(tmp_path / "data" / "egg" / name, ellipsoid(np.array(half_axes)), Sim3(0.4, np.eye(3), np.zeros(3)), views=8)
+    rows = pose.run(tmp_path / "data", Sweep(["ucd"], ["8"], dof=[7, 9]), 2, None)
+    seven, nine = (row for row in rows if row.category == "all")
+    assert (seven.dof, nine.dof, nine.answered) == (7, 9, 100)
+    assert seven.median_iou < nine.median_iou
 
 
 def test_options_multiply_and_are_in_every_row(recorded: Path, tmp_path: Path) -> None:
@@ -124,12 +136,21 @@ def test_all_is_the_mean_over_categories_not_over_pairs(recorded: Path) -> None:
     setting = pose.Setting(ViewCounts("4", 4, 4), PoseConfig(), 32)
     exact = PoseError(0.0, 0.0, 0.0)
     results = [
-        pose.JobResult(pose.Job(setting, large, (small,), {}, 0), (exact,), (1.0,), 2.0),
-        pose.JobResult(pose.Job(setting, replace(small, category="cup"), (large,) * 3, {}, 0), (NO_POSE, NO_POSE, exact), (3.0,) * 3, 4.0),
+        pose.JobResult(pose.Job(setting, large, (small,), {}, 0), (exact,), (1.0,), (7,), (1.0,), 2.0),
+        pose.JobResult(
+            pose.Job(setting, replace(small, category="cup"), (large,) * 3, {}, 0),
+            (NO_POSE, NO_POSE, exact),
+            (0.0, 0.0, 1.0),
+            (0, 0, 7),
+            (3.0,) * 3,
+            4.0,
+        ),
     ]
     cup, egg, everything = pose.table_rows(setting, results)
     assert (cup.category, egg.category, everything.category) == ("cup", "egg", "all")
     assert (egg.acc30, cup.acc30) == (100, pytest.approx(100 / 3))
     assert everything.acc30 == pytest.approx(200 / 3)
+    assert (egg.answered, cup.answered) == (100, pytest.approx(100 / 3))
+    assert (everything.median_iou, cup.median_iou) == (50, 0)
     assert (everything.pairs, everything.solve_ms, everything.memory_mb) == (4, 2, 3)
     assert (cup.median_deg, everything.median_deg, everything.median_t) == (180, 90, np.inf)

@@ -71,6 +71,7 @@ def test_whole_tokens_by_their_size_or_by_none_are_the_same(painted: PaintedObje
         ("ucd", PoseOptions(method="psychic")),
         ("ucd", PoseOptions(estimator="luck")),
         ("ucd", PoseOptions(dims=0)),
+        ("ucd", PoseOptions(dof=6)),
     ],
 )
 def test_an_option_without_effect_or_sense_is_refused_by_its_name(variant: str, options: PoseOptions) -> None:
@@ -83,6 +84,33 @@ def test_an_option_without_effect_or_sense_is_refused_by_its_name(variant: str, 
 def test_more_components_than_are_kept_are_refused(painted: PaintedObject) -> None:
     with pytest.raises(InvalidInput, match="48 for whole tokens, found 65"):
         PoseEstimator(PoseConfig(dims=65)).estimate(build_reference(painted.encode(3, Sim3.identity())), painted.encode(2, Sim3.identity()))
+
+
+def test_nine_degrees_recover_a_scale_for_each_axis(painted: PaintedObject, moved: Sim3) -> None:
+    reference = build_reference(painted.encode(8, Sim3.identity()))
+    stretched = PaintedObject()
+    axes = reference.box.world_from_object[:3, :3]
+    scales = np.array([1.25, 0.85, 1.0])
+    stretched.points = stretched.points @ (axes * scales @ axes.T)
+    estimate = PoseEstimator(PoseConfig.named("ucd", PoseOptions(dof=9))).estimate(reference, stretched.encode(8, moved))
+    assert estimate.target_from_object is not None
+    assert np.allclose(estimate.target_from_object.scales / moved.scale, scales, atol=0.04)
+    assert rotation_angle_deg(estimate.target_from_reference.rotation, moved.rotation) < 2
+    assert np.allclose(estimate.box(reference.box).extent_m, reference.box.extent_m * scales * moved.scale, rtol=0.05)
+    linear = estimate.matrix(reference.box)[:3, :3]
+    assert np.allclose(linear, moved.scale * moved.rotation @ (axes * scales @ axes.T), atol=0.06)
+
+
+def test_points_that_do_not_determine_nine_degrees_keep_seven_and_say_why(moved: Sim3) -> None:
+    flat = PaintedObject()
+    flat.points[:, 2] = 0
+    estimator = PoseEstimator(PoseConfig.named("ucd", PoseOptions(dof=9)))
+    estimate = estimator.estimate(build_reference(flat.encode(8, Sim3.identity())), flat.encode(6, moved))
+    assert_recovered(estimate.target_from_reference, moved)
+    assert estimate.target_from_object is None
+    assert "plane" in str(estimate.not_9d_because)
+    box = build_reference(flat.encode(8, Sim3.identity())).box
+    assert np.allclose(estimate.matrix(box), estimate.target_from_reference.as_matrix())
 
 
 def test_zsp_uses_one_view_of_each(painted: PaintedObject, moved: Sim3) -> None:
