@@ -5,9 +5,9 @@ Letters: n requested viewpoints, C categories.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any, Literal
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Generic, Literal, TypeVar
 
 import numpy as np
 
@@ -15,6 +15,8 @@ from core.sim3 import Sim3
 from core.views import FloatArray
 
 Outcome = Literal["known", "uncertain", "novel"]
+S = TypeVar("S")
+R = TypeVar("R")
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,6 +97,8 @@ class ScanRequest:
     radius_m: float
     world_from_camera: FloatArray
     """Camera poses, shape (n, 4, 4), metres, OpenCV axes; near ones will do."""
+    views: int
+    """Views received so far; of a completed scan 0."""
     views_required: int
     """Fewest views that make a category."""
 
@@ -107,8 +111,28 @@ class ScanRequest:
             np.array(fields["up"]),
             fields["radius_m"],
             np.array(fields["world_from_camera"]),
+            fields["views"],
             fields["views_required"],
         )
+
+
+class Viewpoints:
+    """The viewpoints of a scan, to iterate over."""
+
+    def __init__(self, request: ScanRequest) -> None:
+        self.request = request
+
+    @property
+    def id(self) -> str:
+        """Names it in /v1/scans/{id}."""
+        return self.request.id
+
+    def __iter__(self) -> Iterator[FloatArray]:
+        """The requested camera poses, each `world_from_camera` of shape (4, 4)."""
+        return iter(self.request.world_from_camera)
+
+    def __len__(self) -> int:
+        return len(self.request.world_from_camera)
 
 
 @dataclass(frozen=True)
@@ -152,6 +176,51 @@ class Info:
         return Info(**{name: fields[name] for name in Info.__dataclass_fields__})
 
 
-def similarities_from_json(fields: Mapping[str, Any]) -> tuple[CategorySimilarity, ...]:
-    """All C categories compared with, most similar first."""
-    return tuple(CategorySimilarity(each["category_id"], each["name"], each["similarity"]) for each in fields["similarities"])
+@dataclass(frozen=True, eq=False)
+class Observation(Generic[S]):
+    """What the service says of one burst; S is a scan's type."""
+
+    id: str
+    outcome: Outcome
+    category_id: str | None
+    name: str | None
+    """The category's name, where people gave it one."""
+    pose: Pose | None
+    """Of a known object."""
+    pose_error: str | None
+    """Why a known object has no pose."""
+    scan: S | None
+    """Of a novel object: to be carried out so that it becomes a category."""
+    scan_error: str | None
+    similarities: tuple[CategorySimilarity, ...]
+    """Every category compared with, most similar first."""
+    threshold: float | None
+    """Least similarity of a known object; None where the request named the category."""
+    timings_ms: Mapping[str, float]
+    """Milliseconds of each stage in the service, and their `total`."""
+    raw: Mapping[str, Any]
+    """The answer's JSON."""
+
+    def with_scan(self, make: Callable[[S], R]) -> Observation[R]:
+        """The same, with what `make` makes of its scan, if it has one."""
+        return replace(self, scan=None if self.scan is None else make(self.scan))  # type: ignore[arg-type, return-value]
+
+    @staticmethod
+    def from_json(fields: Mapping[str, Any]) -> Observation[ScanRequest]:
+        """From the service's answer."""
+        return Observation(
+            id=fields["id"],
+            outcome=fields["outcome"],
+            category_id=fields["category_id"],
+            name=fields["name"],
+            pose=Pose.from_json(fields["pose"]) if fields["pose"] else None,
+            pose_error=fields["pose_error"],
+            scan=ScanRequest.from_json(fields["scan"]) if fields["scan"] else None,
+            scan_error=fields["scan_error"],
+            similarities=tuple(
+                CategorySimilarity(each["category_id"], each["name"], each["similarity"]) for each in fields["similarities"]
+            ),
+            threshold=fields["threshold"],
+            timings_ms=fields["timings_ms"],
+            raw=fields,
+        )

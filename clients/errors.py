@@ -4,7 +4,7 @@ OneLookError
 └── ClientError             root of this tree; `str(error)` is one sentence that a person can act on
     ├── Unreachable         nothing answers at the address
     ├── TooSlow             the answer did not come in time
-    └── ServiceProblem      the service answered with a problem (RFC 9457): `.status`, `.title`, `.field`
+    └── ServiceProblem      the service answered with a problem (RFC 9457): `.status`, `.title`, `.field`, `.retry_after_s`
         ├── InvalidInputProblem
         │   ├── TooFewViewsProblem
         │   └── NoObjectProblem
@@ -39,12 +39,14 @@ class TooSlow(ClientError):
 class ServiceProblem(ClientError):
     """The service answered that something is wrong; `str(problem)` is its detail."""
 
-    def __init__(self, detail: str, *, status: int, title: str = "", field: str | None = None) -> None:
+    def __init__(self, detail: str, *, status: int, title: str = "", field: str | None = None, retry_after_s: float | None = None) -> None:
         super().__init__(detail)
         self.status = status
         self.title = title
         self.field = field
         """Path of the wrong field (`views[3].depth`), where it is one field's fault."""
+        self.retry_after_s = retry_after_s
+        """Seconds after which the service expects to be able, where it says so."""
 
 
 class InvalidInputProblem(ServiceProblem):
@@ -89,8 +91,8 @@ PROBLEMS: Mapping[str, type[ServiceProblem]] = {
 }
 
 
-def problem_from_json(status: int, problem: Mapping[str, Any]) -> ServiceProblem:
+def problem_from_json(status: int, problem: Mapping[str, Any], retry_after_s: float | None = None) -> ServiceProblem:
     """The exception for a problem's JSON; an unknown type is a plain ServiceProblem."""
     kind = PROBLEMS.get(problem.get("type", ""), ServiceProblem)
     title = problem.get("title", "")
-    return kind(problem.get("detail") or title, status=status, title=title, field=problem.get("field"))
+    return kind(problem.get("detail") or title, status=status, title=title, field=problem.get("field"), retry_after_s=retry_after_s)

@@ -4,91 +4,101 @@ robot = RobotClient("http://127.0.0.1:8000")
 seen = robot.observe(burst)
 if seen.scan is not None:
     for viewpoint in seen.scan:
-        seen.scan.add(camera.capture(viewpoint))
-    category = seen.scan.complete()
+        seen.scan.add(camera.look(viewpoint))
+    category = seen.scan.complete("cup")
+
+`clients.asynchronous.AsyncRobotClient` has the same methods, to be awaited; `clients.calls` says what each does.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+import functools
+import inspect
+import time
+from collections.abc import Callable
 from types import TracebackType
-from typing import Any
+from typing import Concatenate, ParamSpec, TypeVar
 
 import httpx
 
-from clients.answers import Category, CategorySimilarity, Info, Outcome, Pose, ScanRequest, similarities_from_json
-from clients.errors import TooSlow, Unreachable, problem_from_json
-from clients.multipart import burst_parts
-from core.views import Burst, FloatArray, View
+from clients import answers, calls
+from clients.answers import Category, ScanRequest, Viewpoints
+from clients.calls import Call
+from clients.exchange import Retry, Wait, exchange
+from core.views import Burst, View
 
 DEFAULT_URL = "http://127.0.0.1:8000"
 TIMEOUT_S = 120.0
 """For one answer: a slow machine needs about a second a view, and a scan has up to 32."""
 CONNECT_TIMEOUT_S = 5.0
+P = ParamSpec("P")
+T = TypeVar("T")
+U = TypeVar("U")
 
 
-@dataclass(frozen=True, eq=False)
-class Observation:
-    """What the service says of one burst."""
+def _method(call: Callable[P, Call[T]], wrap: Callable[[RobotClient, T], U]) -> Callable[Concatenate[RobotClient, P], U]:
+    """A client's method that sends what `call` makes of its arguments, and gives back `wrap(client, answer)`."""
 
-    id: str
-    outcome: Outcome
-    category_id: str | None
-    name: str | None
-    """The category's name, where people gave it one."""
-    pose: Pose | None
-    """Of a known object."""
-    pose_error: str | None
-    """Why a known object has no pose."""
-    scan: Scan | None
-    """Of a novel object: to be carried out so that it becomes a category."""
-    scan_error: str | None
-    similarities: tuple[CategorySimilarity, ...]
-    """Every category compared with, most similar first."""
-    threshold: float | None
-    """Least similarity of a known object; None where the request named the category."""
-    timings_ms: Mapping[str, float]
-    """Milliseconds of each stage in the service, and their `total`."""
-    raw: Mapping[str, Any]
-    """The answer's JSON."""
+    @functools.wraps(call)
+    def method(self: RobotClient, /, *args: P.args, **options: P.kwargs) -> U:
+        return wrap(self, self.send(call(*args, **options)))
+
+    method.__signature__ = with_self(call)  # type: ignore[attr-defined]
+    return method
 
 
-class Scan:
+def with_self(function: Callable[..., object]) -> inspect.Signature:
+    """What `help` shows of the method made from `function`."""
+    signature = inspect.signature(function)
+    own = inspect.Parameter("self", inspect.Parameter.POSITIONAL_ONLY)
+    return signature.replace(parameters=[own, *signature.parameters.values()], return_annotation=inspect.Signature.empty)
+
+
+def _as_is(robot: RobotClient, answer: T) -> T:
+    return answer
+
+
+def _scan(robot: RobotClient, request: ScanRequest) -> Scan:
+    return Scan(robot, request)
+
+
+def _observation(robot: RobotClient, seen: answers.Observation[ScanRequest]) -> Observation:
+    return seen.with_scan(lambda request: Scan(robot, request))
+
+
+def _observations(robot: RobotClient, seen: list[answers.Observation[ScanRequest]]) -> list[Observation]:
+    return [_observation(robot, each) for each in seen]
+
+
+class Scan(Viewpoints):
     """A scan to be carried out: iterate over its viewpoints, add a view for each, complete it."""
 
     def __init__(self, robot: RobotClient, request: ScanRequest) -> None:
+        super().__init__(request)
         self._robot = robot
-        self.request = request
-
-    @property
-    def id(self) -> str:
-        """Names it in /v1/scans/{id}."""
-        return self.request.id
-
-    def __iter__(self) -> Iterator[FloatArray]:
-        """The requested camera poses, each `world_from_camera` of shape (4, 4)."""
-        return iter(self.request.world_from_camera)
-
-    def __len__(self) -> int:
-        return len(self.request.world_from_camera)
 
     def add(self, view: View) -> None:
         """Sends one view; its camera says where it was really taken from, in the burst's world frame."""
-        self._robot.post(f"/v1/scans/{self.id}/views", files=burst_parts(Burst([view])))
+        self.request = self._robot.send(calls.add_views(self.id, Burst([view])))
 
     def complete(self, name: str | None = None) -> Category:
         """Makes the views a category, in one step."""
-        return Category.from_json(self._robot.post(f"/v1/scans/{self.id}/complete", json={"name": name}))
+        return self._robot.send(calls.complete_scan(self.id, name))
+
+
+Observation = answers.Observation[Scan]
+"""What the service says of one burst, with a scan that can be carried out."""
 
 
 class RobotClient:
     """Talks to one service. Every method raises what is in `clients.errors`; a context manager closes its connections."""
 
-    def __init__(self, url: str = DEFAULT_URL, *, timeout_s: float = TIMEOUT_S, http: httpx.Client | None = None) -> None:
+    def __init__(
+        self, url: str = DEFAULT_URL, *, timeout_s: float = TIMEOUT_S, retry: Retry | None = None, http: httpx.Client | None = None
+    ) -> None:
         """`http` replaces the connection (a test client, another transport); `url` and `timeout_s` are then its own."""
-        timeout = httpx.Timeout(timeout_s, connect=min(timeout_s, CONNECT_TIMEOUT_S))
-        self._http = http or httpx.Client(base_url=url, timeout=timeout)
+        self._http = http or httpx.Client(base_url=url, timeout=timeouts(timeout_s))
+        self._retry = retry or Retry()
 
     def __enter__(self) -> RobotClient:
         return self
@@ -100,77 +110,40 @@ class RobotClient:
         """Closes the connections."""
         self._http.close()
 
-    def observe(self, burst: Burst, *, frame: str | None = None, **options: str | float | bool) -> Observation:
-        """What `burst` shows: a known object with its pose, or a novel one with a scan to carry out.
-
-        A known object's burst joins its category, unless `learn=False`. `options` are the request's: `learn`, `category_id`, `threshold`,
-        `views_used`, `variant`, `seed`, `include`.
-        """
-        answer = self.post("/v1/observations", files=burst_parts(burst, frame), params=options)
-        return Observation(
-            id=answer["id"],
-            outcome=answer["outcome"],
-            category_id=answer["category_id"],
-            name=answer["name"],
-            pose=Pose.from_json(answer["pose"]) if answer["pose"] else None,
-            pose_error=answer["pose_error"],
-            scan=Scan(self, ScanRequest.from_json(answer["scan"])) if answer["scan"] else None,
-            scan_error=answer["scan_error"],
-            similarities=similarities_from_json(answer),
-            threshold=answer["threshold"],
-            timings_ms=answer["timings_ms"],
-            raw=answer,
-        )
-
-    def scan(self, source: Burst | str) -> Scan:
-        """A scan of the object of a burst, or of an earlier observation by its id, whatever was decided then."""
-        body: dict[str, Any] = {"json": {"observation_id": source}} if isinstance(source, str) else {"files": burst_parts(source)}
-        return Scan(self, ScanRequest.from_json(self.post("/v1/scans", **body)))
-
-    def categories(self) -> list[Category]:
-        """All categories, oldest first."""
-        return [Category.from_json(fields) for fields in self._json("GET", "/v1/categories")["categories"]]
-
-    def rename(self, category_id: str, name: str | None) -> Category:
-        """Says what people call a category."""
-        return Category.from_json(self._json("PATCH", f"/v1/categories/{category_id}", json={"name": name}))
-
-    def forget(self, category_id: str) -> None:
-        """Deletes a category and what it was learnt from."""
-        self._send("DELETE", f"/v1/categories/{category_id}")
-
-    def info(self) -> Info:
-        """The service's version, backbone, threshold and the size of its memory."""
-        return Info.from_json(self._json("GET", "/v1/info"))
-
-    def picture(self, path: str, **params: str | int) -> bytes:
-        """A picture's PNG, as `/v1/observations/{id}/overlay.png`."""
-        return self._send("GET", path, params=params).content
-
-    def post(self, path: str, **request: Any) -> dict[str, Any]:
-        """The JSON answer to a POST; `request` as httpx takes it."""
-        return self._json("POST", path, **request)
-
-    def _json(self, method: str, path: str, **request: Any) -> dict[str, Any]:
-        return dict(self._send(method, path, **request).json())
-
-    def _send(self, method: str, path: str, **request: Any) -> httpx.Response:
-        url = str(self._http.base_url).rstrip("/")
+    def send(self, call: Call[T]) -> T:
+        """The answer to any of `clients.calls`."""
+        steps = exchange(call, self._retry, str(self._http.base_url).rstrip("/"))
+        step = next(steps)
         try:
-            response = self._http.request(method, path, **request)
-        except (httpx.ConnectError, httpx.ConnectTimeout) as error:
-            raise Unreachable(f"nothing answers at {url}; start the service with `onelook serve`, or give its address") from error
-        except httpx.TimeoutException as error:
-            raise TooSlow(f"{url} did not answer {method} {path} in time; send fewer views, or allow more time") from error
+            while True:
+                step = steps.send(self._carry_out(step))
+        except StopIteration as done:
+            answer: T = done.value
+            return answer
+
+    def _carry_out(self, step: Call[T] | Wait) -> httpx.Response | httpx.TransportError | None:
+        if isinstance(step, Wait):
+            time.sleep(step.seconds)
+            return None
+        try:
+            return self._http.request(step.method, step.path, params=step.params, **step.body)
         except httpx.TransportError as error:
-            raise Unreachable(f"the connection to {url} broke ({error}); look at the service's log") from error
-        if response.is_error:
-            raise problem_from_json(response.status_code, _problem(response))
-        return response
+            return error
+
+    observe = _method(calls.observe, _observation)
+    observation = _method(calls.observation, _observation)
+    observations = _method(calls.observations, _observations)
+    scan = _method(calls.scan, _scan)
+    open_scan = _method(calls.open_scan, _scan)
+    forget_scan = _method(calls.forget_scan, _as_is)
+    categories = _method(calls.categories, _as_is)
+    category = _method(calls.category, _as_is)
+    rename = _method(calls.rename, _as_is)
+    forget = _method(calls.forget, _as_is)
+    info = _method(calls.info, _as_is)
+    picture = _method(calls.picture, _as_is)
 
 
-def _problem(response: httpx.Response) -> Mapping[str, Any]:
-    if response.headers.get("content-type", "").startswith("application/problem+json"):
-        return dict(response.json())
-    found = f"{response.url} answered {response.status_code} {response.reason_phrase}"
-    return {"detail": f"{found}, which is no answer of this service; check the address"}
+def timeouts(timeout_s: float) -> httpx.Timeout:
+    """`timeout_s` for an answer, less for a connection."""
+    return httpx.Timeout(timeout_s, connect=min(timeout_s, CONNECT_TIMEOUT_S))

@@ -163,7 +163,10 @@ def _touches_files(function: ast.expr) -> bool:
     return False
 
 
-@pytest.mark.parametrize(("start", "extras"), [("clients.robot", ()), ("clients.command", ()), ("clients.cli", ("cli",))])
+PARTS = [("clients.robot", ()), ("clients.asynchronous", ()), ("clients.command", ()), ("clients.cli", ("cli",))]
+
+
+@pytest.mark.parametrize(("start", "extras"), PARTS)
 def test_an_installation_has_what_its_part_imports(start: str, extras: tuple[str, ...]) -> None:
     """What is imported all the way down comes with the distribution, or with the extra: a robot's computer has no torch."""
     known = {module_name(path): path for package in ALLOWED for path in modules(package)}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 from dataclasses import replace
 
@@ -9,7 +10,7 @@ import cv2
 import numpy as np
 import pytest
 
-from clients.multipart import burst_parts
+from clients.multipart import burst_npz, burst_parts
 from core.errors import InvalidInput
 from core.views import Burst, Camera, View
 
@@ -46,3 +47,16 @@ def test_depth_beyond_16_bits_is_refused() -> None:
     far = replace(VIEW, depth_m=np.full((32, 40), 80.0, np.float32))
     with pytest.raises(InvalidInput, match=r"views\[0\]\.depth: reaches 80\.0 m"):
         burst_parts(Burst([far]))
+
+
+def test_an_npz_is_exact() -> None:
+    with np.load(io.BytesIO(burst_npz(Burst([VIEW, VIEW]))), allow_pickle=False) as arrays:
+        assert set(arrays) == {"rgb", "depth_m", "K", "world_from_camera"}
+        np.testing.assert_array_equal(arrays["rgb"][1], VIEW.rgb)
+        np.testing.assert_array_equal(arrays["depth_m"][0], VIEW.depth_m)
+        np.testing.assert_array_equal(arrays["world_from_camera"], [np.eye(4)] * 2)
+
+
+def test_an_npz_has_images_of_one_size() -> None:
+    with pytest.raises(InvalidInput, match="2 sizes"):
+        burst_npz(Burst([View(VIEW.rgb), View(VIEW.rgb[:, :36].copy())]))

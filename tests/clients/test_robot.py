@@ -11,12 +11,14 @@ import pytest
 
 from clients import errors
 from clients.datasets.folders import Sequence, load_burst
+from clients.exchange import Retry
 from clients.robot import RobotClient
 from clients.simulator.replay import ReplayWorld
+from core.errors import InvalidInput
 
 
 def answering(handler: httpx.MockTransport) -> RobotClient:
-    return RobotClient(http=httpx.Client(transport=handler, base_url="http://robot.test"))
+    return RobotClient(http=httpx.Client(transport=handler, base_url="http://robot.test"), retry=Retry(attempts=1))
 
 
 def test_a_novel_object_is_scanned_learnt_and_recognised(robot: RobotClient, samples: list[Sequence]) -> None:
@@ -57,6 +59,29 @@ def test_categories_are_listed_named_and_forgotten(robot: RobotClient, samples: 
     assert robot.info().categories == 1
     robot.forget(category.id)
     assert robot.categories() == []
+
+
+def test_a_burst_can_travel_exactly(robot: RobotClient, samples: list[Sequence]) -> None:
+    burst = load_burst(samples[0], range(2))
+    seen = robot.observe(burst, exact=True, debug=True)
+    assert seen.raw["views"] == 2
+    assert robot.observation(seen.id).id == seen.id
+    with pytest.raises(InvalidInput, match="frame"):
+        robot.observe(burst, exact=True, frame="map")
+
+
+def test_a_scan_can_be_taken_up_again_and_forgotten(robot: RobotClient, samples: list[Sequence]) -> None:
+    views = load_burst(samples[0], range(2)).views
+    begun = robot.scan(load_burst(samples[0], range(2)))
+    begun.add(views[0])
+    again = robot.open_scan(begun.id)
+    assert again.request.views == 1
+    again.add(views[1])
+    category = again.complete("bug")
+    assert robot.category(category.id).name == "bug"
+    robot.forget_scan(begun.id)
+    with pytest.raises(errors.NotFoundProblem):
+        robot.open_scan(begun.id)
 
 
 def test_pictures_are_png(robot: RobotClient, samples: list[Sequence]) -> None:

@@ -1,0 +1,129 @@
+"""The robot's client for asyncio: the methods of `clients.robot`, to be awaited.
+
+async with AsyncRobotClient("http://127.0.0.1:8000") as robot:
+    seen = await robot.observe(burst)
+    if seen.scan is not None:
+        for viewpoint in seen.scan:
+            await seen.scan.add(await camera.look(viewpoint))
+        category = await seen.scan.complete("cup")
+"""
+
+from __future__ import annotations
+
+import asyncio
+import functools
+from collections.abc import Callable, Coroutine
+from types import TracebackType
+from typing import Any, Concatenate, ParamSpec, TypeVar
+
+import httpx
+
+from clients import calls
+from clients.answers import Category, Observation, ScanRequest, Viewpoints
+from clients.calls import Call
+from clients.exchange import Retry, Wait, exchange
+from clients.robot import DEFAULT_URL, TIMEOUT_S, timeouts, with_self
+from core.views import Burst, View
+
+P = ParamSpec("P")
+T = TypeVar("T")
+U = TypeVar("U")
+
+
+def _method(
+    call: Callable[P, Call[T]], wrap: Callable[[AsyncRobotClient, T], U]
+) -> Callable[Concatenate[AsyncRobotClient, P], Coroutine[Any, Any, U]]:
+    """As in `clients.robot`, to be awaited."""
+
+    @functools.wraps(call)
+    async def method(self: AsyncRobotClient, /, *args: P.args, **options: P.kwargs) -> U:
+        return wrap(self, await self.send(call(*args, **options)))
+
+    method.__signature__ = with_self(call)  # type: ignore[attr-defined]
+    return method
+
+
+def _as_is(robot: AsyncRobotClient, answer: T) -> T:
+    return answer
+
+
+def _scan(robot: AsyncRobotClient, request: ScanRequest) -> AsyncScan:
+    return AsyncScan(robot, request)
+
+
+def _observation(robot: AsyncRobotClient, seen: Observation[ScanRequest]) -> Observation[AsyncScan]:
+    return seen.with_scan(lambda request: AsyncScan(robot, request))
+
+
+def _observations(robot: AsyncRobotClient, seen: list[Observation[ScanRequest]]) -> list[Observation[AsyncScan]]:
+    return [_observation(robot, each) for each in seen]
+
+
+class AsyncScan(Viewpoints):
+    """A scan to be carried out: iterate over its viewpoints, add a view for each, complete it."""
+
+    def __init__(self, robot: AsyncRobotClient, request: ScanRequest) -> None:
+        super().__init__(request)
+        self._robot = robot
+
+    async def add(self, view: View) -> None:
+        """Sends one view; its camera says where it was really taken from, in the burst's world frame."""
+        self.request = await self._robot.send(calls.add_views(self.id, Burst([view])))
+
+    async def complete(self, name: str | None = None) -> Category:
+        """Makes the views a category, in one step."""
+        return await self._robot.send(calls.complete_scan(self.id, name))
+
+
+class AsyncRobotClient:
+    """Talks to one service. Every method raises what is in `clients.errors`; a context manager closes its connections."""
+
+    def __init__(
+        self, url: str = DEFAULT_URL, *, timeout_s: float = TIMEOUT_S, retry: Retry | None = None, http: httpx.AsyncClient | None = None
+    ) -> None:
+        """`http` replaces the connection (a test client, another transport); `url` and `timeout_s` are then its own."""
+        self._http = http or httpx.AsyncClient(base_url=url, timeout=timeouts(timeout_s))
+        self._retry = retry or Retry()
+
+    async def __aenter__(self) -> AsyncRobotClient:
+        return self
+
+    async def __aexit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        await self.close()
+
+    async def close(self) -> None:
+        """Closes the connections."""
+        await self._http.aclose()
+
+    async def send(self, call: Call[T]) -> T:
+        """The answer to any of `clients.calls`."""
+        steps = exchange(call, self._retry, str(self._http.base_url).rstrip("/"))
+        step = next(steps)
+        try:
+            while True:
+                step = steps.send(await self._carry_out(step))
+        except StopIteration as done:
+            answer: T = done.value
+            return answer
+
+    async def _carry_out(self, step: Call[T] | Wait) -> httpx.Response | httpx.TransportError | None:
+        if isinstance(step, Wait):
+            await asyncio.sleep(step.seconds)
+            return None
+        try:
+            return await self._http.request(step.method, step.path, params=step.params, **step.body)
+        except httpx.TransportError as error:
+            return error
+
+    observe = _method(calls.observe, _observation)
+    observation = _method(calls.observation, _observation)
+    observations = _method(calls.observations, _observations)
+    scan = _method(calls.scan, _scan)
+    open_scan = _method(calls.open_scan, _scan)
+    forget_scan = _method(calls.forget_scan, _as_is)
+    categories = _method(calls.categories, _as_is)
+    category = _method(calls.category, _as_is)
+    rename = _method(calls.rename, _as_is)
+    forget = _method(calls.forget, _as_is)
+    info = _method(calls.info, _as_is)
+    picture = _method(calls.picture, _as_is)

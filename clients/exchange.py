@@ -1,0 +1,129 @@
+"""One call's way to its answer: what is sent again, after how long, and what becomes of failures.
+
+Written as a generator that never sends nor waits itself, so that the synchronous and the asynchronous client share it.
+
+A request is sent again where that cannot do a thing twice: reads always, and changes because each carries an idempotency key, by which
+the service knows a request that it has already carried out.
+"""
+
+from __future__ import annotations
+
+import math
+import random
+import uuid
+from collections.abc import Generator, Mapping
+from dataclasses import dataclass, replace
+from datetime import datetime, timezone
+from email.utils import parsedate_to_datetime
+from typing import Any, TypeVar
+
+import httpx
+
+from clients.calls import Call
+from clients.errors import ServiceProblem, TooSlow, Unreachable, problem_from_json
+
+T = TypeVar("T")
+KEY = "Idempotency-Key"
+TRY_AGAIN = frozenset({429, 502, 503, 504})
+"""Statuses of a service, or a proxy before it, that is busy or restarting."""
+PROBLEM = "application/problem+json"
+
+
+@dataclass(frozen=True)
+class Retry:
+    """How often and after how long a request is sent again."""
+
+    attempts: int = 4
+    """In all; 1 never sends again."""
+    first_s: float = 0.25
+    """Wait before the second attempt; it doubles with each one."""
+    longest_s: float = 30.0
+    """No wait is longer: a service that asks for more (Retry-After) is reported as unavailable."""
+
+
+@dataclass(frozen=True)
+class Wait:
+    """Asks the client to wait."""
+
+    seconds: float
+
+
+Answered = httpx.Response | httpx.TransportError | None
+"""What came of a request; None after a wait."""
+Exchange = Generator[Call[T] | Wait, Answered, T]
+
+
+def exchange(call: Call[T], retry: Retry, url: str) -> Exchange[T]:
+    """Yields what is to be sent or waited for, takes what came of it, and returns the answer.
+
+    Raises Unreachable, TooSlow, or the ServiceProblem that was answered.
+    """
+    key = uuid.uuid4().hex
+    if call.method in {"POST", "PATCH"}:
+        call = _with_key(call, key)
+    jitter = random.Random(key)
+    for attempt in range(1, retry.attempts + 1):
+        came = yield call
+        assert came is not None
+        if isinstance(came, httpx.Response) and not came.is_error:
+            return call.read(came)
+        if attempt > 1 and call.method == "DELETE" and isinstance(came, httpx.Response) and came.status_code == 404:
+            return call.read(came)  # the first attempt deleted it, and its answer was lost
+        wait_s = _wait_s(came, attempt, retry, jitter)
+        if wait_s is None or attempt == retry.attempts:
+            raise _failure(came, call, url) from (came if isinstance(came, Exception) else None)
+        yield Wait(wait_s)
+    raise AssertionError("a retry has at least one attempt")
+
+
+def _with_key(call: Call[T], key: str) -> Call[T]:
+    headers = {**call.body.get("headers", {}), KEY: key}
+    if "files" in call.body:
+        # Else each attempt would separate the parts by another word, and the service would take it for another request.
+        headers["Content-Type"] = f"multipart/form-data; boundary={key}"
+    return replace(call, body={**call.body, "headers": headers})
+
+
+def _wait_s(came: httpx.Response | httpx.TransportError, attempt: int, retry: Retry, jitter: random.Random) -> float | None:
+    """How long to wait before the next attempt; None where another one would not help."""
+    backoff_s = min(retry.longest_s, retry.first_s * 2 ** (attempt - 1)) * jitter.uniform(0.5, 1)
+    if isinstance(came, httpx.Response):
+        if came.status_code not in TRY_AGAIN:
+            return None
+        asked_s = retry_after_s(came.headers)
+        if asked_s is None:
+            # A service that knows what is missing (weights, disk) says so in a problem: waiting does not mend it.
+            return None if came.headers.get("content-type", "").startswith(PROBLEM) and came.status_code == 503 else backoff_s
+        return None if asked_s > retry.longest_s else max(asked_s, backoff_s)
+    return None if isinstance(came, (httpx.ReadTimeout, httpx.WriteTimeout)) else backoff_s
+
+
+def retry_after_s(headers: Mapping[str, str]) -> float | None:
+    """Seconds that Retry-After asks to wait, as a number or as a date (RFC 9110, 10.2.3); None where it says nothing that can be read."""
+    value = headers.get("retry-after", "")
+    try:
+        seconds = float(value)
+    except ValueError:
+        try:
+            when = parsedate_to_datetime(value)
+        except ValueError:
+            return None
+        seconds = (when.replace(tzinfo=when.tzinfo or timezone.utc) - datetime.now(timezone.utc)).total_seconds()
+    return max(0.0, seconds) if math.isfinite(seconds) else None
+
+
+def _failure(came: httpx.Response | httpx.TransportError, call: Call[Any], url: str) -> Exception:
+    if isinstance(came, httpx.Response):
+        return _problem(came)
+    if isinstance(came, (httpx.ConnectError, httpx.ConnectTimeout)):
+        return Unreachable(f"nothing answers at {url}; start the service with `onelook serve`, or give its address")
+    if isinstance(came, httpx.TimeoutException):
+        return TooSlow(f"{url} did not answer {call.method} {call.path} in time; send fewer views, or allow more time")
+    return Unreachable(f"the connection to {url} broke ({came}); look at the service's log")
+
+
+def _problem(response: httpx.Response) -> ServiceProblem:
+    if response.headers.get("content-type", "").startswith(PROBLEM):
+        return problem_from_json(response.status_code, response.json(), retry_after_s(response.headers))
+    found = f"{response.url} answered {response.status_code} {response.reason_phrase}"
+    return problem_from_json(response.status_code, {"detail": f"{found}, which is no answer of this service; check the address"})
