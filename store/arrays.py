@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import io
 from collections.abc import Mapping
 from pathlib import Path
@@ -12,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.errors import Unavailable
+from store.folders import Files, FileSum
 
 Array = NDArray[Any]
 BLOB_TYPE = np.dtype("<f4")
@@ -25,7 +25,7 @@ def write_arrays(path: Path, arrays: Mapping[str, Array]) -> str:
     np.savez(buffer, allow_pickle=False, **arrays)
     content = buffer.getvalue()
     path.write_bytes(content)
-    return hashlib.sha256(content).hexdigest()
+    return FileSum.of(content).sha256
 
 
 def read_arrays(path: Path, sha256: str) -> dict[str, Array]:
@@ -34,11 +34,16 @@ def read_arrays(path: Path, sha256: str) -> dict[str, Array]:
         content = path.read_bytes()
     except FileNotFoundError:
         raise Unavailable(f"{path} is missing from the memory; restore it from a backup") from None
-    found = hashlib.sha256(content).hexdigest()
+    found = FileSum.of(content).sha256
     if found != sha256:
         raise Unavailable(f"{path} is damaged: its SHA-256 is {found[:12]}…, {sha256[:12]}… was written; restore it from a backup")
     with np.load(io.BytesIO(content), allow_pickle=False) as npz:
         return dict(npz)
+
+
+def arrays_file(files: Files) -> tuple[str, FileSum]:
+    """The one npz file of a folder, the rest being pictures; its name changes with the backbone."""
+    return next((name, file) for name, file in files.items() if name.endswith(".npz"))
 
 
 def to_blob(tokens: NDArray[np.floating]) -> bytes:

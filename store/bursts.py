@@ -33,6 +33,11 @@ def read_view(folder: Path, index: int) -> View:
     return _read_view(folder, index, _entries(folder)[index])
 
 
+def read_cameras(folder: Path) -> list[Camera | None]:
+    """The cameras of `write_burst`, without reading an image."""
+    return [_camera(entry) for entry in _entries(folder)]
+
+
 def rgb_file(folder: Path, index: int) -> Path:
     """The colour image of one view."""
     return folder / f"{index:03d}_rgb.png"

@@ -6,39 +6,46 @@ import shutil
 import sqlite3
 import threading
 import uuid
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from datetime import datetime, timezone
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from contextvars import ContextVar
 from pathlib import Path
 from typing import Any
 
 from sqlite_utils import Database
 
 from core.errors import Conflict, Unavailable
-from store.folders import new_folder
+from store.folders import FileSum, new_folder, sums
+from store.retention import Retention
 from store.schema import upgrade
 
 Row = dict[str, Any]
+DATABASE = "memory.sqlite3"
+
+running_request: ContextVar[tuple[str, str] | None] = ContextVar("running_request", default=None)
+"""Key and route of the repeatable request that the present changes are made for; see store/requests.py."""
 
 
 class Connection:
     """Rows and folders below `root`, changed together."""
 
-    def __init__(self, root: Path) -> None:
+    def __init__(self, root: Path, retention: Retention | None = None) -> None:
         """Opens or makes the database in `root`, a folder that exists. Raises Unavailable, and Conflict for one of a later version."""
         self.root = root
+        self.retention = retention or Retention()
         self._lock = threading.RLock()
         try:
-            self._db = Database(sqlite3.connect(root / "memory.sqlite3", check_same_thread=False))
+            self._db = Database(sqlite3.connect(root / DATABASE, check_same_thread=False))
         except sqlite3.Error as error:
             raise Unavailable(f"cannot open the memory in {root}: {error}; set ONELOOK_DATA_DIR to a folder that can be written") from error
         try:
             self._db.enable_wal()
+            self._db.execute("PRAGMA synchronous = FULL")  # a committed row survives a power cut, as its folder does
             self._db.execute("PRAGMA foreign_keys = ON")
             upgrade(self._db)
         except sqlite3.Error as error:
             self._db.close()
-            raise Unavailable(f"{root / 'memory.sqlite3'} is no usable database: {error}; restore it from a backup") from error
+            raise Unavailable(f"{root / DATABASE} is no usable database: {error}; restore it from a backup") from error
         except BaseException:
             self._db.close()
             raise
@@ -59,42 +66,69 @@ class Connection:
             ) from error
 
     @contextmanager
-    def change(self) -> Iterator[Database]:
-        """One transaction, which also makes memory_version grow.
+    def change(self, made: str | None = None) -> Iterator[Database]:
+        """One transaction, which also makes memory_version grow, and notes what a repeatable request `made`.
 
         Raises Conflict where it refers to rows that are gone, Unavailable where it cannot be written.
         """
+        with self.housekeeping() as db:
+            yield db
+            db.execute("UPDATE meta SET value = value + 1 WHERE key = 'memory_version'")
+            request = running_request.get()
+            if made is not None and request is not None:
+                db.execute("UPDATE requests SET result_id = ? WHERE key = ? AND route = ?", [made, *request])
+
+    @contextmanager
+    def housekeeping(self) -> Iterator[Database]:
+        """One transaction that changes nothing a reader could see. Raises as `change` does."""
         try:
             with self._lock, self._db.atomic():
                 yield self._db
-                self._db.execute("UPDATE meta SET value = value + 1 WHERE key = 'memory_version'")
         except sqlite3.IntegrityError as error:
             raise Conflict("a category, scan or observation that this needs was deleted meanwhile; send the request again") from error
         except sqlite3.OperationalError as error:
             raise self._unwritable(error) from error
 
-    def create(self, folder: Path, write: Callable[[Path], None], insert: Callable[[Database], None]) -> None:
-        """A folder and its rows, in one step: `write` fills the folder, `insert` commits the rows that make it exist.
+    def create(
+        self,
+        folder: Path,
+        write: Callable[[Path], None],
+        insert: Callable[[Database, dict[str, FileSum]], None],
+        *,
+        made: str | None = None,
+    ) -> None:
+        """A folder and its rows, in one step: `write` fills the folder, `insert` gets what is in it and adds the rows that name it."""
+        self.create_all({folder: write}, lambda db, files: insert(db, files[folder]), made=made)
 
-        Stopped between the two, a process leaves a folder without a row, which the next start removes.
+    def create_all(
+        self,
+        folders: Mapping[Path, Callable[[Path], None]],
+        insert: Callable[[Database, dict[Path, dict[str, FileSum]]], None],
+        *,
+        made: str | None = None,
+    ) -> None:
+        """`create` for several folders, which appear together or not at all.
+
+        Stopped before the rows are committed, a process leaves folders without rows, which the next start removes.
         """
-        try:
-            with new_folder(folder) as partial:
-                write(partial)
-        except OSError as error:
-            raise self._unwritable(error) from error
-        try:
-            with self.change() as db:
-                insert(db)
-        except BaseException:
-            shutil.rmtree(folder, ignore_errors=True)
-            raise
+        files: dict[Path, dict[str, FileSum]] = {}
+        with ExitStack() as undo:
+            for folder, write in folders.items():
+                undo.callback(shutil.rmtree, folder, ignore_errors=True)
+                try:
+                    with new_folder(folder) as partial:
+                        write(partial)
+                        files[folder] = sums(partial)
+                except OSError as error:
+                    raise self._unwritable(error) from error
+            with self.change(made) as db:
+                insert(db, files)
+            undo.pop_all()
 
-    def remove(self, folder: Path, delete: Callable[[Database], object]) -> None:
-        """Rows and their folder: the rows go first, so that nothing ever names a folder that is gone."""
-        with self.change() as db:
-            delete(db)
-        shutil.rmtree(folder, ignore_errors=True)
+    def remove(self, folders: Sequence[Path]) -> None:
+        """Folders that no row names any more: rows go first, so that nothing ever names a folder that is gone."""
+        for folder in folders:
+            shutil.rmtree(folder, ignore_errors=True)
 
     def _unwritable(self, error: Exception) -> Unavailable:
         return Unavailable(f"cannot write to the memory in {self.root}: {error}; free space or set another ONELOOK_DATA_DIR")
@@ -103,11 +137,6 @@ class Connection:
 def new_id() -> str:
     """An id no other memory has."""
     return uuid.uuid4().hex
-
-
-def now() -> str:
-    """The time in UTC, ISO 8601."""
-    return datetime.now(timezone.utc).isoformat(timespec="milliseconds")
 
 
 def only(rows: Sequence[Row]) -> Row | None:

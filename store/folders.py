@@ -1,46 +1,98 @@
-"""Folders that exist whole or not at all."""
+"""Folders that exist whole or not at all, and what their files were when they were written."""
 
 from __future__ import annotations
 
+import hashlib
 import os
 import shutil
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 
 PARTIAL = ".partial-"
-"""Prefix of a folder that is still being written."""
+"""Prefix of a folder or file that is still being written."""
+
+
+@dataclass(frozen=True)
+class FileSum:
+    """What a file was when it was written."""
+
+    size: int
+    """Bytes."""
+    sha256: str
+
+    @staticmethod
+    def of(content: bytes) -> FileSum:
+        """Of a file with this content."""
+        return FileSum(len(content), hashlib.sha256(content).hexdigest())
+
+
+Files = Mapping[str, FileSum]
+"""The files of a folder, by name; every array and every picture is in it."""
 
 
 @contextmanager
 def new_folder(final: Path) -> Iterator[Path]:
     """A folder to write into; it gets the name `final` once everything in it is on the disk, and is removed on an error."""
     partial = final.with_name(PARTIAL + final.name)
-    partial.mkdir(parents=True)
+    make_parents(partial)
+    partial.mkdir()
     try:
         yield partial
         for path in (*partial.iterdir(), partial):
-            _sync(path)
+            sync(path)
         partial.rename(final)
-        _sync(final.parent)
+        sync(final.parent)
     except BaseException:
         shutil.rmtree(partial, ignore_errors=True)
         raise
 
 
-def remove_orphans(parent: Path, known: Collection[str]) -> list[str]:
-    """Removes the folders of `parent` that are not `known`, which a stopped process left behind; returns their names."""
-    if not parent.is_dir():
-        return []
-    orphans = sorted(path.name for path in parent.iterdir() if path.name not in known)
-    for name in orphans:
-        shutil.rmtree(parent / name, ignore_errors=True)
-    return orphans
+def make_parents(path: Path) -> None:
+    """Makes the folders that lead to `path`; each is on the disk with its name before anything is in it."""
+    for parent in reversed(path.parents):
+        if not parent.exists():
+            parent.mkdir(exist_ok=True)
+            sync(parent.parent)
 
 
-def _sync(path: Path) -> None:
+def sync(path: Path) -> None:
+    """Returns once a file's content, or a folder's list of names, is on the disk."""
     descriptor = os.open(path, os.O_RDONLY)
     try:
         os.fsync(descriptor)
     finally:
         os.close(descriptor)
+
+
+def sums(folder: Path) -> dict[str, FileSum]:
+    """What the files of a folder are now, by name."""
+    return {path.name: FileSum.of(path.read_bytes()) for path in sorted(folder.iterdir())}
+
+
+def problem(path: Path, expected: FileSum) -> str | None:
+    """What is wrong with a file, None where it is what was written."""
+    try:
+        found = FileSum.of(path.read_bytes())
+    except FileNotFoundError:
+        return "is missing"
+    except OSError as error:
+        return f"cannot be read: {error.strerror}"
+    if found.size != expected.size:
+        return f"has {found.size} bytes, {expected.size} were written"
+    return None if found == expected else f"its SHA-256 is {found.sha256[:12]}…, {expected.sha256[:12]}… was written"
+
+
+def remove_orphans(parent: Path, known: Collection[str]) -> list[str]:
+    """Removes what is in `parent` and not `known`, which a stopped process left behind; returns the names."""
+    if not parent.is_dir():
+        return []
+    orphans = sorted(path.name for path in parent.iterdir() if path.name not in known)
+    for name in orphans:
+        path = parent / name
+        if path.is_dir() and not path.is_symlink():
+            shutil.rmtree(path, ignore_errors=True)
+        else:
+            path.unlink(missing_ok=True)
+    return orphans

@@ -11,16 +11,25 @@ FOLDER/
 from __future__ import annotations
 
 import fcntl
+import json
 from io import TextIOWrapper
 from pathlib import Path
 from types import TracebackType
+from typing import Any
 
 from core.errors import Conflict, Unavailable
+from store.audit import Audit
 from store.categories import Categories
 from store.connection import Connection
-from store.folders import remove_orphans
+from store.goals import Goals
+from store.instances import Instances
 from store.observations import Observations
+from store.records import AuditEntry
+from store.requests import Requests
+from store.retention import Retention
 from store.scans import Scans
+from store.sweep import purge, seal, sweep
+from store.undo import undo
 
 
 class Memory:
@@ -30,23 +39,35 @@ class Memory:
         self._connection = connection
         self._lock = lock
         self.folder = connection.root
-        self.categories = Categories(connection)
+        self.instances = Instances(connection)
+        self.categories = Categories(connection, self.instances)
         self.scans = Scans(connection)
         self.observations = Observations(connection)
+        self.goals = Goals(connection, self.categories)
+        self.requests = Requests(connection)
+        self.audit = Audit(connection)
 
     @classmethod
-    def open(cls, folder: Path) -> Memory:
-        """Opens the memory in `folder`, or makes an empty one; removes what a stopped process left half written.
+    def open(cls, folder: Path, retention: Retention | None = None) -> Memory:
+        """Opens the memory in `folder`, or makes an empty one; removes what a stopped process left half written, and what is too old.
 
         Raises Conflict where another process has it open, or a later version made it; Unavailable where it cannot be written.
         """
         lock = _lock(folder)
         try:
-            memory = cls(Connection(folder), lock)
+            connection = Connection(folder, retention)
         except BaseException:
             lock.close()
             raise
-        memory._sweep()
+        try:
+            seal(connection)
+            memory = cls(connection, lock)
+            memory.prune()
+            sweep(connection)
+        except BaseException:
+            connection.close()
+            lock.close()
+            raise
         return memory
 
     @property
@@ -55,8 +76,13 @@ class Memory:
         return int(self._meta("memory_version") or 0)
 
     @property
+    def backbone(self) -> str | None:
+        """Name of the backbone that this memory's tokens came from; None before the first."""
+        return self._meta("backbone")
+
+    @property
     def fingerprint(self) -> str | None:
-        """The backbone that this memory's tokens came from; None before the first."""
+        """Of that backbone's weights, layer and preprocessing."""
         return self._meta("fingerprint")
 
     def require_backbone(self, name: str, fingerprint: str) -> None:
@@ -67,12 +93,36 @@ class Memory:
                 db.table("meta").insert_all([{"key": "backbone", "value": name}, {"key": "fingerprint", "value": fingerprint}])
         elif kept != fingerprint:
             raise Conflict(
-                f"the memory in {self.folder} was made with backbone {self._meta('backbone')} (fingerprint {kept}), "
+                f"the memory in {self.folder} was made with backbone {self.backbone} (fingerprint {kept}), "
                 f"this service uses {name} (fingerprint {fingerprint}): their tokens cannot be compared; "
-                "start with the first backbone (ONELOOK_BACKBONE), or keep another memory for this one (ONELOOK_DATA_DIR)"
+                "start with the first backbone (ONELOOK_BACKBONE), keep another memory for this one (ONELOOK_DATA_DIR), "
+                f"or compute the memory anew from its views with `onelook memory reembed --backbone {name}`"
             )
 
-    def check(self) -> None:
+    def setting(self, name: str) -> Any:
+        """What was kept under a name, None before; JSON, opaque here."""
+        return json.loads(self._meta(f"setting:{name}") or "null")
+
+    def keep_setting(self, name: str, value: Any) -> None:
+        """Keeps JSON that belongs to what was learnt, such as a calibrated threshold."""
+        with self._connection.change() as db:
+            db.table("meta").insert({"key": f"setting:{name}", "value": json.dumps(value)}, replace=True)
+
+    def undo(self, entry_id: str, *, actor: str | None = None) -> AuditEntry:
+        """Takes back a change of the audit trail; returns the entry that says so.
+
+        Raises NotFound, and Conflict where it cannot be undone (any more).
+        """
+        return self.audit.get(undo(self._connection, self.audit.get(entry_id), actor))
+
+    def prune(self) -> None:
+        """Ends what has an end: expired scans, removals too old to be undone, observations over the limit, old request keys."""
+        self.scans.expire()
+        self.observations.prune()
+        self.requests.prune()
+        purge(self._connection)
+
+    def ping(self) -> None:
         """Raises Unavailable where the database does not answer."""
         self._connection.rows("SELECT 1")
 
@@ -90,13 +140,6 @@ class Memory:
     def _meta(self, key: str) -> str | None:
         rows = self._connection.rows("SELECT value FROM meta WHERE key = ?", key)
         return str(rows[0]["value"]) if rows else None
-
-    def _sweep(self) -> None:
-        for table, root in (("categories", self.categories.root), ("observations", self.observations.root), ("scans", self.scans.root)):
-            remove_orphans(root, {row["id"] for row in self._connection.rows(f"SELECT id FROM {table}")})
-        if self.scans.root.is_dir():
-            for scan in self.scans.root.iterdir():
-                remove_orphans(scan, set(self.scans.burst_ids(scan.name)))
 
 
 def _lock(folder: Path) -> TextIOWrapper:

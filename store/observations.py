@@ -9,17 +9,25 @@ from pathlib import Path
 
 from sqlite_utils import Database
 
+from core.encode import EncodedBurst
 from core.errors import NotFound
 from core.novelty import Decision
 from core.scan import ScanRequest
 from core.views import Burst, View
-from store.arrays import Array, read_arrays, write_arrays
+from store.arrays import Array, arrays_file, read_arrays, write_arrays
 from store.bursts import read_view, write_burst
-from store.connection import Connection, Row, new_id, now, only
-from store.records import Observation, Outcome, Pose, decision_from_json, decision_to_json, pose_from_json, pose_to_json
+from store.columns import decision_from_json, decision_to_json, files_from_json, files_to_json, pose_from_json, pose_to_json
+from store.connection import Connection, Row, new_id, only
+from store.folders import Files
+from store.instances import insert_instance
+from store.records import Assignment, Observation, Outcome, Pose
+from store.retention import ahead, now
 from store.scans import insert_scan
 
-SELECT = "SELECT o.*, (SELECT s.id FROM scans s WHERE s.observation_id = o.id ORDER BY s.rowid LIMIT 1) AS scan_id FROM observations o"
+SELECT = """
+    SELECT o.*, c.id AS living_category_id, (SELECT s.id FROM scans s WHERE s.observation_id = o.id ORDER BY s.rowid LIMIT 1) AS scan_id
+    FROM observations o LEFT JOIN categories c ON c.id = o.category_id AND c.removed_by IS NULL
+"""
 FEATURES = "features.npz"
 
 
@@ -37,48 +45,80 @@ class Answer:
     timings_ms: Mapping[str, float]
 
 
+@dataclass(frozen=True, eq=False)
+class Joins:
+    """That the burst becomes an instance of a category."""
+
+    category_id: str
+    encoded: EncodedBurst
+    similarity: float | None
+    how: Assignment
+
+
 class Observations:
-    """The observations of one memory."""
+    """The observations of one memory, at most as many as its retention says."""
 
     def __init__(self, connection: Connection) -> None:
         self._connection = connection
         self.root = connection.root / "observations"
 
-    def create(self, answer: Answer, burst: Burst, features: Mapping[str, Array], request: ScanRequest | None = None) -> Observation:
-        """Keeps an observation, and begins the scan it asks for; `features` are plain arrays, opaque here."""
+    def create(
+        self,
+        answer: Answer,
+        burst: Burst,
+        features: Mapping[str, Array],
+        request: ScanRequest | None = None,
+        *,
+        joins: Joins | None = None,
+    ) -> Observation:
+        """Keeps an observation, and in the same step begins the scan it asks for, assigns it to a category, and drops the oldest.
+
+        `features` are plain arrays, opaque here. Raises Conflict where the category is gone.
+        """
         observation_id = new_id()
-        checksum: list[str] = []
+        dropped: list[str] = []
 
         def write(folder: Path) -> None:
             write_burst(folder, burst)
-            checksum.append(write_arrays(folder / FEATURES, features))
+            write_arrays(folder / FEATURES, features)
 
-        def insert(db: Database) -> None:
-            db.table("observations").insert(
-                {
-                    "id": observation_id,
-                    "created_at": now(),
-                    "outcome": answer.outcome,
-                    "category_id": answer.category_id,
-                    "frame": answer.frame,
-                    "views": len(burst),
-                    "decision": decision_to_json(answer.decision) if answer.decision else None,
-                    "pose": pose_to_json(answer.pose) if answer.pose else None,
-                    "pose_error": answer.pose_error,
-                    "scan_error": answer.scan_error,
-                    "timings_ms": json.dumps(dict(answer.timings_ms)),
-                    "features_sha256": checksum[0],
-                }
-            )
+        def insert(db: Database, files: Files) -> None:
+            db.table("observations").insert(_row(observation_id, answer, len(burst), files))
             if request is not None:
-                insert_scan(db, request, observation_id)
+                insert_scan(db, new_id(), request, observation_id, ahead(self._connection.retention.scans))
+            if joins is not None:
+                insert_instance(
+                    db,
+                    joins.category_id,
+                    joins.encoded,
+                    source="observation",
+                    source_id=observation_id,
+                    how=joins.how,
+                    similarity=joins.similarity,
+                )
+            dropped.extend(self._drop_oldest(db))
 
-        self._connection.create(self.folder(observation_id), write, insert)
+        self._connection.create(self.folder(observation_id), write, insert, made=observation_id)
+        self._connection.remove([self.folder(each) for each in dropped])
         return self.get(observation_id)
 
-    def latest(self, limit: int) -> list[Observation]:
-        """The latest ones, newest first."""
-        return [_observation(row) for row in self._connection.rows(f"{SELECT} ORDER BY o.rowid DESC LIMIT ?", limit)]
+    def latest(
+        self, limit: int, *, before: str | None = None, category_id: str | None = None, outcome: Outcome | None = None
+    ) -> list[Observation]:
+        """The latest ones, newest first: those before an observation, recognised as a category, or with an outcome where that is given.
+
+        Raises NotFound for an unknown observation.
+        """
+        wanted: dict[str, object] = {}
+        if before is not None:
+            wanted["o.rowid < (SELECT rowid FROM observations WHERE id = ?)"] = self.get(before).id
+        if category_id is not None:
+            wanted["c.id = ?"] = category_id
+        if outcome is not None:
+            wanted["o.outcome = ?"] = outcome
+        where = " AND ".join(wanted) or "TRUE"
+        rows = self._connection.rows(f"{SELECT} WHERE {where} ORDER BY o.rowid DESC LIMIT ?", *wanted.values(), limit)
+        return [_observation(row) for row in rows]
 
     def get(self, observation_id: str) -> Observation:
         """Raises NotFound."""
@@ -96,12 +136,46 @@ class Observations:
 
     def features(self, observation_id: str) -> dict[str, Array]:
         """The arrays it was kept with. Raises NotFound, and Unavailable where their file is damaged."""
-        observation = self.get(observation_id)
-        return read_arrays(self.folder(observation_id) / FEATURES, observation.features_sha256)
+        rows = self._connection.rows("SELECT files FROM observations WHERE id = ?", self.get(observation_id).id)
+        name, file = arrays_file(files_from_json(rows[0]["files"]))
+        return read_arrays(self.folder(observation_id) / name, file.sha256)
 
     def folder(self, observation_id: str) -> Path:
         """Where its files are."""
         return self.root / observation_id
+
+    def prune(self) -> None:
+        """Drops what is more than the retention allows, which may have become less since."""
+        with self._connection.housekeeping() as db:
+            dropped = self._drop_oldest(db)
+        self._connection.remove([self.folder(each) for each in dropped])
+
+    def _drop_oldest(self, db: Database) -> list[str]:
+        """Within a transaction; returns which, whose folders go once it is committed."""
+        rows = db.query("SELECT id FROM observations ORDER BY rowid DESC LIMIT -1 OFFSET ?", [self._connection.retention.observations])
+        dropped = [row["id"] for row in rows]
+        for each in dropped:
+            db.execute("UPDATE instances SET pictures = NULL WHERE pictures = ?", [f"observations/{each}"])
+            db.execute("DELETE FROM observations WHERE id = ?", [each])
+        return dropped
+
+
+def _row(observation_id: str, answer: Answer, views: int, files: Files) -> Row:
+    return {
+        "id": observation_id,
+        "created_at": now(),
+        "outcome": answer.outcome,
+        "category_id": answer.category_id,
+        "frame": answer.frame,
+        "views": views,
+        "decision": decision_to_json(answer.decision) if answer.decision else None,
+        "pose": pose_to_json(answer.pose) if answer.pose else None,
+        "pose_error": answer.pose_error,
+        "scan_error": answer.scan_error,
+        "timings_ms": json.dumps(dict(answer.timings_ms)),
+        "features_sha256": arrays_file(files)[1].sha256,
+        "files": files_to_json(files),
+    }
 
 
 def _observation(row: Row) -> Observation:
@@ -109,7 +183,7 @@ def _observation(row: Row) -> Observation:
         row["id"],
         row["created_at"],
         row["outcome"],
-        row["category_id"],
+        row["living_category_id"],
         row["frame"],
         row["views"],
         decision_from_json(row["decision"]) if row["decision"] else None,

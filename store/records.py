@@ -1,16 +1,10 @@
-"""What the memory keeps, as it is handed out: frozen, with ids as plain strings and times as ISO 8601 in UTC.
-
-Letters: V views, D token size, n requested viewpoints.
-"""
+"""What the memory keeps, as it is handed out: frozen, with ids as plain strings and times as ISO 8601 in UTC."""
 
 from __future__ import annotations
 
-import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
-
-import numpy as np
-from numpy.typing import NDArray
 
 from core.boxes import OrientedBox
 from core.novelty import Decision
@@ -18,7 +12,11 @@ from core.scan import ScanRequest
 from core.sim3 import Sim3
 
 Outcome = Literal["known", "uncertain", "novel"]
-ScanState = Literal["requested", "collecting", "completed"]
+ScanState = Literal["requested", "collecting", "completed", "expired"]
+Anchor = Literal["center", "base"]
+Assignment = Literal["scan", "decision", "named", "confirmed"]
+"""How a burst came to a category: by the scan it was learnt from, by the decision, by the caller's word, or by a person's."""
+Action = Literal["create", "rename", "merge", "split", "delete", "forget", "import", "reembed", "undo"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +33,69 @@ class Category:
     extent_m: tuple[float, float, float]
     """Edge lengths of the reference's oriented box, metres."""
     reference_sha256: str
+    origin_id: str
+    """The id it has in the memory where it was learnt; another one after an import."""
+
+
+@dataclass(frozen=True, eq=False)
+class Instance:
+    """A burst assigned to a category, and where it came from; its tokens are read apart."""
+
+    id: str
+    category_id: str
+    created_at: str
+    source: Literal["scan", "observation"]
+    source_id: str | None
+    """Of that scan or observation, which may be gone since; None where an earlier version did not record it."""
+    how: Assignment
+    similarity: float | None
+    """To the category, when it was assigned; None where nobody asked."""
+    views: int
+    """Of its tokens."""
+    pictures: str | None
+    """Folder of its views below the memory's; None once they are dropped, when another backbone can no longer compute its tokens."""
+
+    @property
+    def kept(self) -> bool:
+        """Whether its views are still there."""
+        return self.pictures is not None
+
+
+@dataclass(frozen=True, eq=False)
+class Goal:
+    """Where an object of a category should end."""
+
+    id: str
+    category_id: str
+    created_at: str
+    name: str | None
+    target_from_reference: Sim3
+    """Takes the reference to the place and size where it should be."""
+    frame: str | None
+    """Name of the world frame that the goal is in, as the caller gave it."""
+    anchor: Anchor
+    """Which point of another object of the category is put where the reference's is."""
+    observation_id: str | None
+    """The observation that the goal was taken from, while that is kept."""
+
+
+@dataclass(frozen=True, eq=False)
+class AuditEntry:
+    """One change of what was learnt: who, what, when, and how it was before and after."""
+
+    id: str
+    created_at: str
+    actor: str | None
+    """Who asked for it, as the caller said."""
+    action: Action
+    category_id: str | None
+    """The category that was changed."""
+    before: Mapping[str, Any]
+    after: Mapping[str, Any]
+    undone_by: str | None
+    """The entry that undid it."""
+    undoable: bool
+    """Whether `Memory.undo` may still take it back."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +112,8 @@ class Scan:
     """The observation whose object is scanned."""
     category_id: str | None
     """The category the completed scan made."""
+    expires_at: str
+    """When it ends unless more views come before."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,81 +157,3 @@ class Observation:
     """Why a novel object has no scan."""
     timings_ms: dict[str, float]
     features_sha256: str
-
-
-def request_to_json(request: ScanRequest) -> str:
-    """One TEXT column."""
-    arrays = {name: getattr(request, name).tolist() for name in ("center_m", "up", "world_from_camera", "excluded")}
-    return json.dumps(arrays | {"radius_m": request.radius_m, "extent_m": request.extent_m, "up_from": request.up_from})
-
-
-def request_from_json(text: str) -> ScanRequest:
-    """The inverse of `request_to_json`."""
-    fields = json.loads(text)
-    return ScanRequest(
-        center_m=np.array(fields["center_m"]),
-        up=np.array(fields["up"]),
-        radius_m=fields["radius_m"],
-        world_from_camera=np.array(fields["world_from_camera"]),
-        extent_m=fields.get("extent_m", fields["radius_m"] / 2),
-        up_from=fields.get("up_from", "cameras"),
-        excluded=np.array(fields.get("excluded", ())).reshape(-1, 4, 4),
-    )
-
-
-def decision_to_json(decision: Decision) -> str:
-    """One TEXT column."""
-    return json.dumps(
-        {"outcome": decision.outcome, "score": decision.score, "threshold": decision.threshold, "similarities": decision.similarities}
-    )
-
-
-def decision_from_json(text: str) -> Decision:
-    """The inverse of `decision_to_json`."""
-    fields = json.loads(text)
-    similarities = tuple((category_id, similarity) for category_id, similarity in fields.pop("similarities"))
-    return Decision(**fields, similarities=similarities)
-
-
-def pose_to_json(pose: Pose) -> str:
-    """One TEXT column."""
-    return json.dumps(
-        {
-            "target_from_reference": _sim3(pose.target_from_reference),
-            "box": {"world_from_object": pose.box.world_from_object.tolist(), "extent_m": pose.box.extent_m.tolist()},
-            "inliers": pose.inliers,
-            "correspondences": pose.correspondences,
-            "best_view": pose.best_view,
-            "residual_m": pose.residual_m,
-            "score": pose.score,
-            "confidence": pose.confidence,
-            "alternatives": [[_sim3(transform), score] for transform, score in pose.alternatives],
-        }
-    )
-
-
-def pose_from_json(text: str) -> Pose:
-    """The inverse of `pose_to_json`."""
-    fields = json.loads(text)
-    box = OrientedBox(np.array(fields["box"]["world_from_object"]), np.array(fields["box"]["extent_m"]))
-    alternatives = tuple((_as_sim3(transform), score) for transform, score in fields["alternatives"])
-    return Pose(
-        _as_sim3(fields["target_from_reference"]),
-        box,
-        fields["inliers"],
-        fields["correspondences"],
-        fields["best_view"],
-        fields["residual_m"],
-        fields["score"],
-        fields["confidence"],
-        alternatives,
-    )
-
-
-def _sim3(transform: Sim3) -> dict[str, Any]:
-    return {"scale": transform.scale, "rotation": transform.rotation.tolist(), "translation": transform.translation.tolist()}
-
-
-def _as_sim3(fields: dict[str, Any]) -> Sim3:
-    rotation: NDArray[np.floating] = np.array(fields["rotation"])
-    return Sim3(fields["scale"], rotation, np.array(fields["translation"]))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+
 from sqlite_utils import Database, Migrations
 from sqlite_utils.db import ForeignKey
 
@@ -85,6 +87,81 @@ def m001_tables(db: Database) -> None:
         ],
     )
     for table, column in (("instances", "category_id"), ("scan_bursts", "scan_id"), ("scans", "observation_id")):
+        db.table(table).create_index([column])
+
+
+@migrations()
+def m002_years(db: Database) -> None:
+    """What a memory needs that is kept for years: provenance, checksums, an audit trail, goals, and an end to what is only passing."""
+    db.table("audit").create(
+        {
+            "id": str,
+            "created_at": str,
+            "actor": str,
+            "action": str,
+            "category_id": str,
+            "before": str,
+            "after": str,
+            "undone_by": str,
+        },
+        pk="id",
+        not_null={"created_at", "action", "before", "after"},
+        foreign_keys=[_reference("audit", "undone_by", "audit", "SET NULL")],
+    )
+    db.table("goals").create(
+        {
+            "id": str,
+            "category_id": str,
+            "created_at": str,
+            "name": str,
+            "target_from_reference": str,
+            "frame": str,
+            "anchor": str,
+            "observation_id": str,
+        },
+        pk="id",
+        not_null={"category_id", "created_at", "target_from_reference", "anchor"},
+        foreign_keys=[
+            _reference("goals", "category_id", "categories", "CASCADE"),
+            _reference("goals", "observation_id", "observations", "SET NULL"),
+        ],
+    )
+    db.table("goals").create_index(["category_id"])
+    db.table("requests").create(
+        {
+            "key": str,
+            "route": str,
+            "digest": str,
+            "created_at": str,
+            "result_id": str,
+            "status": int,
+            "media_type": str,
+            "body": bytes,
+        },
+        pk=("key", "route"),
+        not_null={"digest", "created_at"},
+    )
+    new_columns: dict[str, dict[str, type]] = {
+        "categories": {"origin_id": str, "files": str, "removed_by": str},
+        "observations": {"files": str},
+        "scans": {"expires_at": str},
+        "scan_bursts": {"files": str, "report": str},
+        "instances": {"how": str, "source_id": str, "similarity": float, "pictures": str, "tokens_sha256": str, "removed_by": str},
+    }
+    for table, columns in new_columns.items():
+        for column, kind in columns.items():
+            db.table(table).add_column(column, kind)
+    db.execute("UPDATE categories SET origin_id = id")
+    db.execute("UPDATE instances SET how = 'scan', pictures = 'categories/' || category_id WHERE source = 'scan'")
+    db.execute(
+        "UPDATE instances SET source_id = (SELECT s.id FROM scans s WHERE s.category_id = instances.category_id) WHERE source = 'scan'"
+    )
+    db.execute("UPDATE instances SET how = 'decision', source_id = observation_id WHERE source = 'observation'")
+    db.execute("UPDATE instances SET pictures = 'observations/' || observation_id WHERE observation_id IS NOT NULL")
+    for instance in list(db.query("SELECT id, cls, pooled FROM instances")):
+        sha256 = hashlib.sha256(instance["cls"] + instance["pooled"]).hexdigest()
+        db.execute("UPDATE instances SET tokens_sha256 = ? WHERE id = ?", [sha256, instance["id"]])
+    for table, column in (("instances", "pictures"), ("instances", "removed_by"), ("categories", "removed_by")):
         db.table(table).create_index([column])
 
 

@@ -22,7 +22,7 @@ def healthz() -> Health:
 @router.get("/readyz", responses=problems(503))
 def readyz(agent: AgentDep) -> Health:
     """The backbone is loaded and the memory answers."""
-    agent.memory.check()
+    agent.memory.ping()
     return Health()
 
 

@@ -55,10 +55,9 @@ def test_renaming(memory: Memory, category: Category) -> None:
     assert memory.categories.rename(category.id, None).name is None
 
 
-def test_deleting_forgets_rows_and_files(memory: Memory, category: Category) -> None:
+def test_a_deleted_category_is_gone(memory: Memory, category: Category) -> None:
     memory.categories.delete(category.id)
     assert memory.categories.members() == []
-    assert not memory.categories.folder(category.id).exists()
     with pytest.raises(NotFound):
         memory.categories.get(category.id)
 

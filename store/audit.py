@@ -1,0 +1,65 @@
+"""The audit trail: who changed what was learnt, when, and how it was before and after."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+from sqlite_utils import Database
+
+from core.errors import NotFound
+from store.connection import Connection, Row, new_id, only
+from store.records import Action, AuditEntry
+from store.retention import ago, now
+
+UNDOABLE: tuple[Action, ...] = ("rename", "merge", "split", "delete", "forget")
+
+
+class Audit:
+    """The audit trail of one memory."""
+
+    def __init__(self, connection: Connection) -> None:
+        self._connection = connection
+
+    def latest(self, limit: int) -> list[AuditEntry]:
+        """The latest changes, newest first."""
+        return [self._entry(row) for row in self._connection.rows("SELECT * FROM audit ORDER BY rowid DESC LIMIT ?", limit)]
+
+    def get(self, entry_id: str) -> AuditEntry:
+        """Raises NotFound."""
+        row = only(self._connection.rows("SELECT * FROM audit WHERE id = ?", entry_id))
+        if row is None:
+            raise NotFound(f"no change has the id {entry_id!r}")
+        return self._entry(row)
+
+    def _entry(self, row: Row) -> AuditEntry:
+        recent = row["created_at"] > ago(self._connection.retention.undo)
+        return AuditEntry(
+            row["id"],
+            row["created_at"],
+            row["actor"],
+            row["action"],
+            row["category_id"],
+            json.loads(row["before"]),
+            json.loads(row["after"]),
+            row["undone_by"],
+            recent and row["undone_by"] is None and row["action"] in UNDOABLE,
+        )
+
+
+def record(
+    db: Database,
+    action: Action,
+    category_id: str | None,
+    before: Mapping[str, Any],
+    after: Mapping[str, Any],
+    actor: str | None,
+    *,
+    entry_id: str | None = None,
+) -> str:
+    """Adds an entry within a transaction; returns its id."""
+    entry_id = entry_id or new_id()
+    row = {"id": entry_id, "created_at": now(), "actor": actor, "action": action, "category_id": category_id}
+    db.table("audit").insert(row | {"before": json.dumps(dict(before)), "after": json.dumps(dict(after))})
+    return entry_id

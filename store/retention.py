@@ -1,0 +1,45 @@
+"""How much is kept, and for how long."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime, timedelta, timezone
+
+from core.errors import InvalidInput
+
+
+@dataclass(frozen=True)
+class Retention:
+    """Limits of one memory. What was learnt has none: only what was seen, and what was thrown away, comes to an end."""
+
+    observations: int = 1000
+    """Most observations kept; each is some megabytes of views. The oldest goes, with its views, when one more is kept."""
+    undo: timedelta = timedelta(days=30)
+    """How long a rename, merge, split, forgetting or deletion can be undone; then what it removed is removed for good."""
+    scans: timedelta = timedelta(hours=24)
+    """A scan that no views come for expires after this."""
+    requests: timedelta = timedelta(hours=24)
+    """How long a repeated request is recognised by its key."""
+
+    def __post_init__(self) -> None:
+        if self.observations < 1:
+            raise InvalidInput("observations", f"found {self.observations}, expected at least 1 to keep")
+
+
+def now() -> str:
+    """The time in UTC, ISO 8601; later times sort later."""
+    return _text(datetime.now(timezone.utc))
+
+
+def ago(span: timedelta) -> str:
+    """What `now` was that long ago."""
+    return _text(datetime.now(timezone.utc) - span)
+
+
+def ahead(span: timedelta) -> str:
+    """What `now` will be after that long."""
+    return _text(datetime.now(timezone.utc) + span)
+
+
+def _text(time: datetime) -> str:
+    return time.isoformat(timespec="milliseconds")

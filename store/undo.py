@@ -1,0 +1,76 @@
+"""Taking back a change of what was learnt, as long as nothing later rests on it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from sqlite_utils import Database
+
+from core.errors import Conflict
+from store.audit import UNDOABLE, record
+from store.categories import move_instances
+from store.connection import Connection, new_id
+from store.records import Action, AuditEntry
+
+
+def undo(connection: Connection, entry: AuditEntry, actor: str | None) -> str:
+    """Takes one change back and returns the id of the entry that says so.
+
+    Raises Conflict where it is undone already, too long ago, of a kind that cannot be undone, or changed again since.
+    """
+    if not entry.undoable:
+        raise Conflict(f"change {entry.id!r} cannot be undone: {_why_not(connection, entry)}")
+    undo_id = new_id()
+    with connection.change(undo_id) as db:
+        record(db, "undo", entry.category_id, {"entry": entry.id, "action": entry.action}, {}, actor, entry_id=undo_id)
+        first = db.execute("UPDATE audit SET undone_by = ? WHERE id = ? AND undone_by IS NULL", [undo_id, entry.id])
+        if first.rowcount != 1 or not REVERSE[entry.action](db, entry, undo_id):
+            raise Conflict(f"change {entry.id!r} cannot be undone: what it changed was changed again since; undo the later change first")
+    return undo_id
+
+
+def _why_not(connection: Connection, entry: AuditEntry) -> str:
+    if entry.undone_by is not None:
+        return "it is undone already"
+    if entry.action not in UNDOABLE:
+        return f"only {', '.join(UNDOABLE)} can be, this is of the kind {entry.action}"
+    return f"it is older than {connection.retention.undo}"
+
+
+def _rename(db: Database, entry: AuditEntry, undo_id: str) -> bool:
+    update = "UPDATE categories SET name = ? WHERE id = ? AND name IS ? AND removed_by IS NULL"
+    return bool(db.execute(update, [entry.before["name"], entry.category_id, entry.after["name"]]).rowcount)
+
+
+def _delete(db: Database, entry: AuditEntry, undo_id: str) -> bool:
+    return bool(db.execute("UPDATE categories SET removed_by = NULL WHERE removed_by = ?", [entry.id]).rowcount)
+
+
+def _forget(db: Database, entry: AuditEntry, undo_id: str) -> bool:
+    living = "category_id IN (SELECT id FROM categories WHERE removed_by IS NULL)"
+    return bool(db.execute(f"UPDATE instances SET removed_by = NULL WHERE removed_by = ? AND {living}", [entry.id]).rowcount)
+
+
+def _merge(db: Database, entry: AuditEntry, undo_id: str) -> bool:
+    assert entry.category_id is not None
+    back = move_instances(db, entry.before["instances"], entry.after["into"], entry.category_id)
+    return _delete(db, entry, undo_id) and back > 0
+
+
+def _split(db: Database, entry: AuditEntry, undo_id: str) -> bool:
+    """The part goes into the bin; every burst that it has by now returns, so that none is lost."""
+    part_id = entry.after["category"]
+    part = db.execute("UPDATE categories SET removed_by = ? WHERE id = ? AND removed_by IS NULL", [undo_id, part_id])
+    living = "? IN (SELECT id FROM categories WHERE removed_by IS NULL)"
+    back = f"UPDATE instances SET category_id = ? WHERE category_id = ? AND {living}"
+    return bool(part.rowcount and db.execute(back, [entry.category_id, part_id, entry.category_id]).rowcount)
+
+
+REVERSE: dict[Action, Callable[[Database, AuditEntry, str], bool]] = {
+    "rename": _rename,
+    "delete": _delete,
+    "forget": _forget,
+    "merge": _merge,
+    "split": _split,
+}
+"""Each returns whether things were as the change left them."""
