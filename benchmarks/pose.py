@@ -138,7 +138,7 @@ class PoseRow:
 
 COLUMNS = tuple(field.name for field in fields(PoseRow))
 OPTIONS = COLUMNS[COLUMNS.index("method") :]
-"""Printed where they differ between rows."""
+"""Printed where they differ between rows of a variant."""
 MEAN_COLUMNS = COLUMNS[COLUMNS.index("acc30") : COLUMNS.index("method")]
 """What an "all" row averages over categories."""
 
@@ -178,7 +178,7 @@ def run(data: Path, sweep: Sweep, limit: int | None, json: Path | None, seed: in
             "threads_per_worker": 1,
         }
         write_json(json, meta, [asdict(row) for row in rows])
-    differing = [name for name in OPTIONS if len({getattr(row, name) for row in rows}) > 1]
+    differing = [name for name in OPTIONS if len({(row.variant, getattr(row, name)) for row in rows}) > len(set(sweep.variants))]
     print_table(f"Pose, {data}", [asdict(row) for row in rows], [*(name for name in COLUMNS if name not in OPTIONS), *differing])
     return rows
 

@@ -12,9 +12,11 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from core.affine9 import Affine9, fit_affine9
 from core.boxes import cloud_extent_m, inliers
 from core.encode import EncodedView
 from core.estimators.batched import Sim3Batch, umeyama_batch
+from core.sim3 import Sim3
 from core.views import FloatArray
 
 BATCH = 32
@@ -62,27 +64,43 @@ class DenseAgreement:
         parts = []
         for start in range(0, len(transforms), BATCH):
             batch = transforms.select(range(start, min(start + BATCH, len(transforms))))
-            log = self._log_agreement(batch, self.config.sigma, 1.0)
+            log = self._log_agreement(batch.apply(self._reference), self.config.sigma, 1.0)
             parts.append((log.amax(dim=2).exp().mean(dim=1) * log.amax(dim=1).exp().mean(dim=1)).sqrt())
         return torch.cat(parts)
 
     def refine(self, transforms: Sim3Batch) -> Sim3Batch:
         """Rounds of weighted least squares on soft matches in both directions."""
         for sigma in self.config.refine_sigmas:
-            log = self._log_agreement(transforms, sigma, self.config.refine_power)
-            aims = (log / self.config.temperature).softmax(dim=2) @ self._target
-            starts = (log / self.config.temperature).softmax(dim=1).transpose(1, 2) @ self._reference
-            weights = torch.cat([log.amax(dim=2), log.amax(dim=1)], dim=1).exp()
-            count = len(transforms)
-            source = torch.cat([self._reference.expand(count, -1, -1), starts], dim=1)
-            target = torch.cat([aims, self._target.expand(count, -1, -1)], dim=1)
-            refined, determined = umeyama_batch(source, target, weights)
+            refined, determined = umeyama_batch(*self._soft_matches(transforms.apply(self._reference), sigma))
             transforms = refined.where(determined, transforms)
         return transforms
 
-    def _log_agreement(self, transforms: Sim3Batch, sigma: float, power: float) -> Tensor:
-        """Log of exp(−(d/σ)²)·max(0, cosine)^power, shape (T, N, Q)."""
-        distance = torch.cdist(transforms.apply(self._reference), self._target.expand(len(transforms), -1, -1))
+    def stretch(self, transform: Sim3, world_from_object: Sim3) -> Affine9:
+        """target_from_object: the same with a scale for each axis of the object's frame, from a transform that is nearly right.
+
+        `world_from_object` is rigid. Raises NoPose where the matches do not determine it.
+        """
+        stretched = Affine9.from_similarity(transform @ world_from_object)
+        points = world_from_object.inverse().apply(self._reference.double().numpy())
+        for sigma in self.config.refine_sigmas:
+            placed = torch.from_numpy(stretched.apply(points)).float()
+            source, target, weights = (each[0].double().numpy() for each in self._soft_matches(placed[None], sigma))
+            stretched = fit_affine9(world_from_object.inverse().apply(source), target, weights)
+        return stretched
+
+    def _soft_matches(self, placed: Tensor, sigma: float) -> tuple[Tensor, Tensor, Tensor]:
+        """Points of the reference and of the target, (T, N + Q, 3), and weights, for reference points placed as in `_log_agreement`."""
+        log = self._log_agreement(placed, sigma, self.config.refine_power)
+        aims = (log / self.config.temperature).softmax(dim=2) @ self._target
+        starts = (log / self.config.temperature).softmax(dim=1).transpose(1, 2) @ self._reference
+        weights = torch.cat([log.amax(dim=2), log.amax(dim=1)], dim=1).exp()
+        count = len(placed)
+        source = torch.cat([self._reference.expand(count, -1, -1), starts], dim=1)
+        return source, torch.cat([aims, self._target.expand(count, -1, -1)], dim=1), weights
+
+    def _log_agreement(self, placed: Tensor, sigma: float, power: float) -> Tensor:
+        """Log of exp(−(d/σ)²)·max(0, cosine)^power, shape (T, N, Q), for reference points placed in the target's world, (T, N, 3)."""
+        distance = torch.cdist(placed, self._target.expand(len(placed), -1, -1))
         return power * self._log_cosine - (distance / (sigma * self.extent_m)) ** 2
 
 

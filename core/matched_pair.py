@@ -6,14 +6,17 @@ Letters: M reference views, N target views, Q view pairs, P points.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from core.correspond import PairMatches, PatchSet, match
-from core.descriptors import unit
+from core.descriptors import PcaBasis, unit
 from core.encode import EncodedBurst, EncodedView
-from core.reference import Reference
+from core.matches import Matches
 from core.viewpoints import best_reference_per_target, relative_rotations
 from core.views import FloatArray
 
@@ -21,13 +24,39 @@ Pairs = list[tuple[int, int]]
 """(reference view, target view)"""
 
 
-class MatchedPair:
-    """Trusted patches only: what has no measured depth carries no geometry."""
+class Described(Protocol):
+    """What matching needs of a reference."""
 
-    def __init__(self, reference: Reference, target: EncodedBurst, dims: int | None, correspondences: int, method: str) -> None:
-        """`dims`, `correspondences` and `method` as in `PoseConfig`."""
-        self.reference = [view.trusted_only() for view in reference.views]
-        self.target = [view.trusted_only() for view in target.views]
+    @property
+    def views(self) -> tuple[EncodedView, ...]: ...
+
+    @property
+    def basis(self) -> PcaBasis: ...
+
+
+class MatchedPair:
+    """Trusted patches only, where depth is asked for: what has no measured depth carries no geometry."""
+
+    def __init__(
+        self,
+        reference: Described,
+        target: EncodedBurst,
+        dims: int | None,
+        correspondences: int,
+        method: str,
+        *,
+        depth: tuple[bool, bool] = (True, True),
+    ) -> None:
+        """`dims`, `correspondences` and `method` as in `PoseConfig`; `depth` says of which side, reference and target, patches without
+        it are left out."""
+        self.kept = tuple(
+            [np.flatnonzero(view.trusted) if measured else np.arange(len(view.cells)) for view in views]
+            for views, measured in zip((reference.views, target.views), depth)
+        )
+        """Indices among all of a view's patches, one array a view, of the reference and of the target."""
+        self.reference, self.target = (
+            [view.trusted_only() if measured else view for view in views] for views, measured in zip((reference.views, target.views), depth)
+        )
         self.descriptors = _describe(self.reference, reference, dims), _describe(self.target, reference, dims)
         sides = [_patches(views, vectors, method) for views, vectors in zip((self.reference, self.target), self.descriptors)]
         self.found: PairMatches = match(sides[0], sides[1], correspondences, method)
@@ -42,6 +71,18 @@ class MatchedPair:
         of_reference, of_target = (np.concatenate([view.points_m for view in views]) for views in (self.reference, self.target))
         return of_reference, of_target
 
+    def among_all_patches(self, matches: Matches) -> Matches:
+        """The same correspondences, with indices among all of a view's patches."""
+
+        def lift(kept: list[NDArray[np.intp]], view: NDArray[np.intp], patch: NDArray[np.intp]) -> NDArray[np.intp]:
+            return np.array([kept[each][index] for each, index in zip(view, patch)], dtype=np.intp)
+
+        return replace(
+            matches,
+            reference_patch=lift(self.kept[0], matches.reference_view, matches.reference_patch),
+            target_patch=lift(self.kept[1], matches.target_view, matches.target_patch),
+        )
+
     def best_pairs(self) -> Pairs:
         """Every target view with its most similar reference view, where anything matched."""
         return [each for each in best_reference_per_target(self.similarity) if self.similarity[each] > 0]
@@ -55,7 +96,7 @@ class MatchedPair:
         return np.array([self.similarity[each] for each in pairs])
 
 
-def _describe(views: Sequence[EncodedView], reference: Reference, dims: int | None) -> list[FloatArray]:
+def _describe(views: Sequence[EncodedView], reference: Described, dims: int | None) -> list[FloatArray]:
     """Unit descriptors of each view's patches, along the reference's first `dims` components."""
     return [unit(view.descriptors if dims is None else reference.basis.project(view.descriptors, dims)) for view in views]
 

@@ -6,7 +6,7 @@ Letters: M reference views, N target views, K correspondences.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -108,17 +108,3 @@ def end_points(matches: Matches, reference: Sequence[EncodedView], target: Seque
 def _gather(views: Sequence[EncodedView], view_index: NDArray[np.intp], patch: NDArray[np.intp]) -> FloatArray:
     starts = np.cumsum([0, *(len(view.points_m) for view in views)])[:-1]
     return np.concatenate([view.points_m for view in views])[starts[view_index] + patch]
-
-
-def among_all_patches(matches: Matches, reference: Sequence[EncodedView], target: Sequence[EncodedView]) -> Matches:
-    """Patch indices among the trusted patches become indices among all of a view's patches."""
-
-    def lift(views: Sequence[EncodedView], view_index: NDArray[np.intp], patch: NDArray[np.intp]) -> NDArray[np.intp]:
-        trusted = [np.flatnonzero(view.trusted) for view in views]
-        return np.array([trusted[view][index] for view, index in zip(view_index, patch)], dtype=np.intp)
-
-    return replace(
-        matches,
-        reference_patch=lift(reference, matches.reference_view, matches.reference_patch),
-        target_patch=lift(target, matches.target_view, matches.target_patch),
-    )

@@ -21,9 +21,10 @@ from core.errors import InvalidInput, NoPose
 from core.estimators.named import ESTIMATORS
 from core.hypotheses import HypothesesConfig, distinct, propose
 from core.matched_pair import MatchedPair
-from core.matches import Alternative, PoseEstimate, among_all_patches, pool
+from core.matches import Alternative, PoseEstimate, pool
 from core.reference import Reference
-from core.solvers import by_consensus, by_retrieval, by_single_view, judge, with_axis_scales
+from core.sim3 import Sim3
+from core.solvers import axis_scales, by_consensus, by_retrieval, by_single_view, judge, stretched
 from core.viewpoints import view_agreement
 
 
@@ -67,7 +68,7 @@ class PoseConfig:
     solver: Literal["retrieval", "single view", "umeyama", "agreement"] = "umeyama"
     """From view pairs to a transform: the mean of their rotations, one pair alone, the paper's RANSAC, or ours over many hypotheses."""
     dof: int = 7
-    """9 for a scale of each axis of the object's frame, fitted to the inliers of the 7-D transform."""
+    """9 for a scale of each axis of the object's frame, fitted to what agrees with the 7-D transform."""
     all_views: bool = False
     """Every view there is takes part, of reference and target: whoever chooses views asks this first."""
     best: BestConfig = field(default_factory=BestConfig)
@@ -151,9 +152,9 @@ class PoseEstimator:
         threshold_m = self.config.inlier_ratio * cloud_extent_m(target.cloud_m)
         estimate = self._solve(pair, threshold_m, seed, clock)
         if config.dof == 9:
-            estimate = with_axis_scales(estimate, pair, reference.box, threshold_m)
+            estimate = self._stretch(estimate, pair, Sim3.from_matrix(reference.box.world_from_object), threshold_m, seed)
             clock.lap("axis scales")
-        return replace(estimate, matches=among_all_patches(estimate.matches, reference.views, target.views), stage_ms=clock.stage_ms)
+        return replace(estimate, matches=pair.among_all_patches(estimate.matches), stage_ms=clock.stage_ms)
 
     def _solve(self, pair: MatchedPair, threshold_m: float, seed: int, clock: StageClock) -> PoseEstimate:
         config = self.config
@@ -164,6 +165,18 @@ class PoseEstimator:
         if config.solver == "umeyama":
             return by_consensus(pair, config.consensus_deg, ESTIMATORS[config.estimator], threshold_m, seed, clock)
         return self._by_agreement(pair, threshold_m, seed, clock)
+
+    def _stretch(self, estimate: PoseEstimate, pair: MatchedPair, world_from_object: Sim3, threshold_m: float, seed: int) -> PoseEstimate:
+        """9-D where that is determined, else 7-D as it was."""
+        try:
+            if self.config.solver == "agreement":
+                agreement = DenseAgreement(pair.reference, pair.target, pair.descriptors, self.config.best.polish, seed)
+                transform = agreement.stretch(estimate.target_from_reference, world_from_object)
+            else:
+                transform = axis_scales(estimate, pair, world_from_object, threshold_m)
+        except NoPose as error:
+            return replace(estimate, not_9d_because=str(error))
+        return stretched(estimate, transform, pair, world_from_object, threshold_m)
 
     def _by_agreement(self, pair: MatchedPair, threshold_m: float, seed: int, clock: StageClock) -> PoseEstimate:
         """Ours: many hypotheses, the most promising refined, the one that lays the objects on each other best."""

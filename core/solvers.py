@@ -10,7 +10,6 @@ from dataclasses import replace
 import numpy as np
 
 from core.affine9 import Affine9, fit_affine9
-from core.boxes import OrientedBox
 from core.clock import StageClock
 from core.errors import NoPose
 from core.estimators.base import Estimator, refit
@@ -69,37 +68,42 @@ def _fitted(pair: MatchedPair, pairs: Pairs, fit: Estimator, threshold_m: float,
     return PoseEstimate(found.target_from_reference, marked, pair.similarity, tuple(pairs), found.residual_m)
 
 
-def with_axis_scales(estimate: PoseEstimate, pair: MatchedPair, box: OrientedBox, threshold_m: float) -> PoseEstimate:
-    """The 9-D transform that fits the correspondences which agree with a 7-D one (appendix, "Replacing 7D similarity transform").
+def axis_scales(estimate: PoseEstimate, pair: MatchedPair, world_from_object: Sim3, threshold_m: float) -> Affine9:
+    """target_from_object: the 9-D transform of the correspondences which agree with a 7-D one (appendix, "Replacing 7D similarity
+    transform with 9D affine transform").
 
-    Fitted to the inliers, which are then counted again, while that loses none. Where the inliers do not determine it the estimate stays
-    7-D and says why.
+    Fitted to the inliers, which are then counted again, while that loses none. Raises NoPose where they do not determine it.
     """
-    world_from_object = Sim3.from_matrix(box.world_from_object)
     source, aim = end_points(estimate.matches, pair.reference, pair.target)
     source = world_from_object.inverse().apply(source)
     inlier = estimate.matches.inlier
-    transform: Affine9 | None = None
-    try:
-        for _ in range(REFITS):
-            fitted = fit_affine9(source[inlier], aim[inlier])
-            if fitted.scales.max() > MAX_SCALE or fitted.scales.min() < 1 / MAX_SCALE:
-                raise NoPose(f"the scales {np.round(fitted.scales, 2).tolist()} of the axes are beyond 1/{MAX_SCALE:g} to {MAX_SCALE:g}")
-            again = np.linalg.norm(fitted.apply(source) - aim, axis=1) < threshold_m
-            if transform is not None and again.sum() < inlier.sum():
-                break
-            transform, inlier = fitted, again
-    except NoPose as error:
-        if transform is None:
-            return replace(estimate, not_9d_because=str(error))
-    assert transform is not None, "the first round fits one or raises"
-    errors = np.linalg.norm(transform.apply(source) - aim, axis=1)[inlier]
+    transform = _bounded(fit_affine9(source[inlier], aim[inlier]))
+    for _ in range(REFITS - 1):
+        again = np.linalg.norm(transform.apply(source) - aim, axis=1) < threshold_m
+        if again.sum() < inlier.sum():
+            break
+        inlier = again
+        transform = _bounded(fit_affine9(source[inlier], aim[inlier]))
+    return transform
+
+
+def _bounded(transform: Affine9) -> Affine9:
+    if transform.scales.max() > MAX_SCALE or transform.scales.min() < 1 / MAX_SCALE:
+        raise NoPose(f"the scales {np.round(transform.scales, 2).tolist()} of the axes are beyond 1/{MAX_SCALE:g} to {MAX_SCALE:g}")
+    return transform
+
+
+def stretched(estimate: PoseEstimate, transform: Affine9, pair: MatchedPair, world_from_object: Sim3, threshold_m: float) -> PoseEstimate:
+    """The estimate with a 9-D transform, a target_from_object, in place of its 7-D one."""
+    source, aim = end_points(estimate.matches, pair.reference, pair.target)
+    errors = np.linalg.norm(transform.apply(world_from_object.inverse().apply(source)) - aim, axis=1)
+    inlier = errors < threshold_m
     return replace(
         estimate,
         target_from_object=transform,
         target_from_reference=transform.similarity() @ world_from_object.inverse(),
         matches=replace(estimate.matches, inlier=inlier),
-        residual_m=float(np.sqrt((errors**2).mean())) if errors.size else 0.0,
+        residual_m=float(np.sqrt((errors[inlier] ** 2).mean())) if inlier.any() else 0.0,
     )
 
 

@@ -86,19 +86,20 @@ def test_more_components_than_are_kept_are_refused(painted: PaintedObject) -> No
         PoseEstimator(PoseConfig(dims=65)).estimate(build_reference(painted.encode(3, Sim3.identity())), painted.encode(2, Sim3.identity()))
 
 
-def test_nine_degrees_recover_a_scale_for_each_axis(painted: PaintedObject, moved: Sim3) -> None:
+@pytest.mark.parametrize(("variant", "tolerance"), [("ucd", 0.04), ("best", 0.08)])
+def test_nine_degrees_recover_a_scale_for_each_axis(variant: str, tolerance: float, painted: PaintedObject, moved: Sim3) -> None:
     reference = build_reference(painted.encode(8, Sim3.identity()))
     stretched = PaintedObject()
     axes = reference.box.world_from_object[:3, :3]
     scales = np.array([1.25, 0.85, 1.0])
     stretched.points = stretched.points @ (axes * scales @ axes.T)
-    estimate = PoseEstimator(PoseConfig.named("ucd", PoseOptions(dof=9))).estimate(reference, stretched.encode(8, moved))
+    estimate = PoseEstimator(PoseConfig.named(variant, PoseOptions(dof=9))).estimate(reference, stretched.encode(8, moved))
     assert estimate.target_from_object is not None
-    assert np.allclose(estimate.target_from_object.scales / moved.scale, scales, atol=0.04)
+    assert np.allclose(estimate.target_from_object.scales / moved.scale, scales, atol=tolerance)
     assert rotation_angle_deg(estimate.target_from_reference.rotation, moved.rotation) < 2
-    assert np.allclose(estimate.box(reference.box).extent_m, reference.box.extent_m * scales * moved.scale, rtol=0.05)
+    assert np.allclose(estimate.box(reference.box).extent_m, reference.box.extent_m * scales * moved.scale, rtol=tolerance)
     linear = estimate.matrix(reference.box)[:3, :3]
-    assert np.allclose(linear, moved.scale * moved.rotation @ (axes * scales @ axes.T), atol=0.06)
+    assert np.allclose(linear, moved.scale * moved.rotation @ (axes * scales @ axes.T), atol=2 * tolerance)
 
 
 def test_points_that_do_not_determine_nine_degrees_keep_seven_and_say_why(moved: Sim3) -> None:
