@@ -16,6 +16,7 @@ from core.reference import Reference
 from core.scan import ScanRequest
 from core.views import Burst, Camera, View
 from store.memory import Memory
+from store.records import Category
 
 VIEWS, PATCHES, DIM = 3, 5, 8
 
@@ -77,6 +78,18 @@ def reference(encoded: EncodedBurst) -> Reference:
     basis = PcaBasis.fit(np.concatenate([view.descriptors for view in encoded.views]), 4)
     box = OrientedBox(np.eye(4), np.array([0.1, 0.2, 0.3]))
     return Reference(encoded.views, basis, encoded.cloud_m, box, np.zeros((0, 3, 3)), encoded.fingerprint)
+
+
+@pytest.fixture
+def category(memory: Memory, reference: Reference, burst: Burst, encoded: EncodedBurst) -> Category:
+    """One category."""
+    return memory.categories.create(reference, burst, encoded, name="cup")
+
+
+@pytest.fixture
+def other(memory: Memory, category: Category, reference: Reference, burst: Burst, encoded: EncodedBurst) -> Category:
+    """A younger one."""
+    return memory.categories.create(reference, burst, encoded, name="mug")
 
 
 @pytest.fixture

@@ -16,12 +16,6 @@ from store.memory import Memory
 from store.records import Category
 
 
-@pytest.fixture
-def category(memory: Memory, reference: Reference, burst: Burst, encoded: EncodedBurst) -> Category:
-    """One category."""
-    return memory.categories.create(reference, burst, encoded, name="cup")
-
-
 def test_a_category_tells_what_it_is(category: Category) -> None:
     assert (category.name, category.views, category.instances, category.extent_m) == ("cup", 3, 1, (0.1, 0.2, 0.3))
 

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
-from sqlite_utils import Database
 
 from core.encode import EncodedBurst
-from core.errors import Conflict, Unavailable
+from core.errors import Conflict, InvalidInput, Unavailable
 from core.reference import Reference
 from core.scan import ScanRequest
 from core.views import Burst
 from store.memory import Memory
-from store.schema import upgrade
+from store.observations import Answer
+from store.retention import Retention
+
+NOVEL = Answer("novel", None, None, None, None, None, None, {})
 
 
 def test_an_empty_memory_has_version_0_and_nothing_in_it(memory: Memory) -> None:
@@ -76,22 +79,6 @@ def test_a_file_that_is_no_database_is_named(folder: Path) -> None:
         Memory.open(folder)
 
 
-def test_a_memory_of_a_later_version_is_refused(folder: Path, memory: Memory) -> None:
-    memory.close()
-    with Database(folder / "memory.sqlite3") as db:
-        db.table("_sqlite_migrations").insert({"migration_set": "onelook", "name": "m999_later", "applied_at": "2099"})
-    with pytest.raises(Conflict, match="m999_later"):
-        Memory.open(folder)
-
-
-def test_upgrading_twice_changes_nothing() -> None:
-    with Database(memory=True) as db:
-        upgrade(db)
-        before = db.schema
-        upgrade(db)
-        assert db.schema == before
-
-
 def test_half_written_folders_are_removed_at_the_start(
     folder: Path, reference: Reference, burst: Burst, encoded: EncodedBurst, request_for_views: ScanRequest
 ) -> None:
@@ -111,3 +98,25 @@ def test_half_written_folders_are_removed_at_the_start(
         assert not any(orphan.exists() for orphan in orphans)
         assert memory.categories.reference(category.id)
         assert memory.scans.get(scan.id).views == len(burst)
+
+
+def test_limits_hold_after_they_were_lowered(folder: Path, burst: Burst) -> None:
+    with Memory.open(folder) as memory:
+        ids = [memory.observations.create(NOVEL, burst, {"a": np.arange(3)}).id for _ in range(3)]
+    with Memory.open(folder, Retention(observations=1)) as memory:
+        assert [each.id for each in memory.observations.latest(9)] == ids[2:]
+        assert [path.name for path in memory.observations.root.iterdir()] == ids[2:]
+
+
+def test_no_observation_at_all_is_refused() -> None:
+    with pytest.raises(InvalidInput, match="at least 1"):
+        Retention(observations=0)
+
+
+def test_settings_survive(folder: Path) -> None:
+    with Memory.open(folder) as memory:
+        assert memory.setting("threshold") is None
+        memory.keep_setting("threshold", {"pooled": 0.4})
+        memory.keep_setting("threshold", {"pooled": 0.5})
+    with Memory.open(folder) as memory:
+        assert memory.setting("threshold") == {"pooled": 0.5}

@@ -1,0 +1,100 @@
+"""A memory opens with every schema that was released, and keeps what it knows."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from sqlite_utils import Database
+
+from core.encode import EncodedBurst
+from core.errors import Conflict
+from core.reference import Reference
+from core.views import Burst
+from store.columns import files_from_json
+from store.folders import sums
+from store.memory import Memory
+from store.records import Category
+from store.schema import upgrade
+from store.sweep import FOLDERS
+
+
+@pytest.fixture
+def first_version(folder: Path) -> Path:
+    """Written by the first version: a category made of a scan and joined by an observation, and a scan in progress."""
+    shutil.unpack_archive(Path(__file__).parents[1] / "data" / "memory_m001.zip", folder)
+    return folder
+
+
+@pytest.fixture
+def upgraded(first_version: Path) -> Iterator[Memory]:
+    """The same, opened."""
+    with Memory.open(first_version) as memory:
+        yield memory
+
+
+@pytest.fixture
+def cup(upgraded: Memory) -> Category:
+    """Its category."""
+    (category,) = upgraded.categories.all()
+    return category
+
+
+def test_what_was_learnt_is_still_known(upgraded: Memory, cup: Category, reference: Reference, encoded: EncodedBurst) -> None:
+    assert (upgraded.backbone, cup.name, cup.instances, cup.origin_id) == ("dinov2-s14", "cup", 2, cup.id)
+    found = upgraded.categories.reference(cup.id)
+    assert np.array_equal(found.cloud_m, reference.cloud_m)
+    assert np.array_equal(found.views[1].points_m, reference.views[1].points_m)
+    for member in upgraded.categories.members():
+        assert np.array_equal(member.cls, encoded.cls)
+        assert np.array_equal(member.pooled, encoded.pooled)
+
+
+def test_provenance_is_what_can_be_told(upgraded: Memory, cup: Category) -> None:
+    scanned, seen = upgraded.instances.of(cup.id)
+    assert (scanned.source, scanned.how, upgraded.scans.get(scanned.source_id).category_id) == ("scan", "scan", cup.id)
+    assert (seen.source, seen.how, seen.source_id) == ("observation", "decision", upgraded.observations.latest(1)[0].id)
+
+
+def test_the_views_behind_every_instance_are_found(upgraded: Memory, cup: Category, burst: Burst) -> None:
+    for instance in upgraded.instances.of(cup.id):
+        assert np.array_equal(upgraded.instances.burst(instance.id).views[2].rgb, burst.views[2].rgb)
+
+
+def test_what_was_seen_and_answered_is_still_there(upgraded: Memory, cup: Category) -> None:
+    (seen,) = upgraded.observations.latest(9)
+    assert (seen.outcome, seen.category_id, seen.frame, seen.pose.inliers) == ("known", cup.id, "map", 10)
+    assert seen.pose.target_from_reference.scale == 0.7
+    assert upgraded.observations.features(seen.id)["a"].tolist() == [0, 1, 2]
+
+
+def test_a_scan_in_progress_goes_on(upgraded: Memory, burst: Burst) -> None:
+    (row,) = upgraded._connection.rows("SELECT id FROM scans WHERE state = 'collecting'")
+    assert upgraded.scans.require_open(row["id"]).views == 3
+    assert upgraded.scans.add(row["id"], burst).views == 6
+
+
+def test_every_file_gets_a_checksum(upgraded: Memory) -> None:
+    folders = [row for query in FOLDERS.values() for row in upgraded._connection.rows(query)]
+    assert len(folders) == 3
+    for row in folders:
+        assert files_from_json(row["files"]) == sums(upgraded.folder / row["folder"])
+
+
+def test_a_memory_of_a_later_version_is_refused(folder: Path, memory: Memory) -> None:
+    memory.close()
+    with Database(folder / "memory.sqlite3") as db:
+        db.table("_sqlite_migrations").insert({"migration_set": "onelook", "name": "m999_later", "applied_at": "2099"})
+    with pytest.raises(Conflict, match="m999_later"):
+        Memory.open(folder)
+
+
+def test_upgrading_twice_changes_nothing() -> None:
+    with Database(memory=True) as db:
+        upgrade(db)
+        before = db.schema
+        upgrade(db)
+        assert db.schema == before

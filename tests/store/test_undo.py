@@ -1,0 +1,141 @@
+"""The audit trail says who changed what, and takes it back."""
+
+from __future__ import annotations
+
+from datetime import timedelta
+from pathlib import Path
+
+import pytest
+
+from core.encode import EncodedBurst
+from core.errors import Conflict, NotFound
+from core.reference import Reference
+from core.sim3 import Sim3
+from core.views import Burst
+from store.memory import Memory
+from store.records import AuditEntry, Category
+from store.retention import Retention
+
+
+def last(memory: Memory) -> AuditEntry:
+    return memory.audit.latest(1)[0]
+
+
+def test_a_change_says_who_and_what(memory: Memory, category: Category) -> None:
+    memory.categories.rename(category.id, "mug", actor="anna")
+    entry, created = memory.audit.latest(2)
+    assert (entry.actor, entry.action, entry.category_id) == ("anna", "rename", category.id)
+    assert (entry.before, entry.after) == ({"name": "cup"}, {"name": "mug"})
+    assert entry.undoable
+    assert (created.action, created.actor, created.undoable) == ("create", None, False)
+
+
+def test_undoing_a_name(memory: Memory, category: Category) -> None:
+    memory.categories.rename(category.id, "mug")
+    entry = last(memory)
+    undone = memory.undo(entry.id, actor="anna")
+    assert memory.categories.get(category.id).name == "cup"
+    assert (undone.action, undone.actor, undone.before["entry"]) == ("undo", "anna", entry.id)
+    assert memory.audit.get(entry.id).undone_by == undone.id
+
+
+def test_undoing_a_deletion_brings_everything_back(memory: Memory, category: Category, reference: Reference) -> None:
+    memory.goals.create(category.id, "shelf", Sim3.identity())
+    memory.categories.delete(category.id)
+    assert memory.categories.members() == []
+    memory.undo(last(memory).id)
+    assert memory.categories.get(category.id).name == "cup"
+    assert len(memory.categories.members()) == 1
+    assert [goal.name for goal in memory.goals.of(category.id)] == ["shelf"]
+    assert memory.categories.reference(category.id).views[0].grid == reference.views[0].grid
+
+
+def test_undoing_a_merge_gives_each_its_own(memory: Memory, category: Category, other: Category) -> None:
+    memory.categories.merge(category.id, other.id)
+    memory.undo(last(memory).id)
+    assert [(each.id, each.instances) for each in memory.categories.all()] == [(category.id, 1), (other.id, 1)]
+
+
+def test_undoing_a_split_loses_no_burst(memory: Memory, category: Category, other: Category, reference: Reference, burst: Burst) -> None:
+    (mine,) = memory.instances.of(category.id)
+    memory.categories.merge(category.id, other.id)
+    part = memory.categories.split(other.id, [mine.id], reference, burst)
+    memory.undo(last(memory).id)
+    assert [(each.id, each.instances) for each in memory.categories.all()] == [(other.id, 2)]
+    with pytest.raises(NotFound):
+        memory.categories.get(part.id)
+
+
+def test_undoing_a_forgotten_instance(memory: Memory, category: Category, other: Category) -> None:
+    memory.categories.merge(category.id, other.id)
+    first = memory.instances.of(other.id)[0]
+    memory.instances.forget(other.id, first.id)
+    memory.undo(last(memory).id)
+    assert memory.instances.get(first.id).category_id == other.id
+
+
+def test_nothing_is_undone_twice(memory: Memory, category: Category) -> None:
+    memory.categories.rename(category.id, "mug")
+    entry = last(memory)
+    memory.undo(entry.id)
+    with pytest.raises(Conflict, match="undone already"):
+        memory.undo(entry.id)
+    with pytest.raises(Conflict, match="of the kind undo"):
+        memory.undo(last(memory).id)
+
+
+def test_what_changed_since_is_not_overwritten(memory: Memory, category: Category, other: Category) -> None:
+    memory.categories.rename(category.id, "beaker")
+    first = last(memory)
+    memory.categories.rename(category.id, "mug")
+    version = memory.version
+    with pytest.raises(Conflict, match="undo the later change first"):
+        memory.undo(first.id)
+    assert (memory.version, memory.categories.get(category.id).name) == (version, "mug")
+    assert memory.audit.get(first.id).undone_by is None
+
+
+def test_a_merge_into_what_was_merged_on_is_undone_last(
+    memory: Memory, category: Category, other: Category, reference: Reference, burst: Burst, encoded: EncodedBurst
+) -> None:
+    third = memory.categories.create(reference, burst, encoded)
+    memory.categories.merge(category.id, other.id)
+    first = last(memory)
+    memory.categories.merge(other.id, third.id)
+    second = last(memory)
+    with pytest.raises(Conflict, match="later change first"):
+        memory.undo(first.id)
+    memory.undo(second.id)
+    memory.undo(first.id)
+    assert [each.instances for each in memory.categories.all()] == [1, 1, 1]
+
+
+def test_an_unknown_change_is_refused(memory: Memory) -> None:
+    with pytest.raises(NotFound):
+        memory.undo("nope")
+
+
+def test_after_its_time_a_deletion_is_for_good(folder: Path, reference: Reference, burst: Burst, encoded: EncodedBurst) -> None:
+    with Memory.open(folder, Retention(undo=timedelta(0))) as memory:
+        category = memory.categories.create(reference, burst, encoded)
+        memory.categories.delete(category.id)
+        with pytest.raises(Conflict, match="older than"):
+            memory.undo(last(memory).id)
+        memory.prune()
+        assert not memory.categories.folder(category.id).exists()
+        assert memory._connection.rows("SELECT id FROM categories") == []
+        assert memory._connection.rows("SELECT id FROM instances") == []
+
+
+def test_the_views_of_a_merged_category_stay_as_long_as_its_burst(
+    folder: Path, reference: Reference, burst: Burst, encoded: EncodedBurst
+) -> None:
+    with Memory.open(folder, Retention(undo=timedelta(0))) as memory:
+        first, second = (memory.categories.create(reference, burst, encoded) for _ in range(2))
+        (moved,) = memory.instances.of(first.id)
+        memory.categories.merge(first.id, second.id)
+        memory.prune()
+        assert len(memory.instances.burst(moved.id)) == len(burst)
+        memory.instances.forget(second.id, moved.id)
+        memory.prune()
+        assert not memory.categories.folder(first.id).exists()
