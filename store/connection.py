@@ -29,8 +29,11 @@ running_request: ContextVar[tuple[str, str] | None] = ContextVar("running_reques
 class Connection:
     """Rows and folders below `root`, changed together."""
 
-    def __init__(self, root: Path, retention: Retention | None = None) -> None:
-        """Opens or makes the database in `root`, a folder that exists. Raises Unavailable, and Conflict for one of a later version."""
+    def __init__(self, root: Path, retention: Retention | None = None, *, only_read: bool = False) -> None:
+        """Opens or makes the database in `root`, a folder that exists; `only_read` refuses every change.
+
+        Raises Unavailable, and Conflict for one of a later version.
+        """
         self.root = root
         self.retention = retention or Retention()
         self._lock = threading.RLock()
@@ -43,6 +46,7 @@ class Connection:
             self._db.execute("PRAGMA synchronous = FULL")  # a committed row survives a power cut, as its folder does
             self._db.execute("PRAGMA foreign_keys = ON")
             upgrade(self._db)
+            self._db.execute(f"PRAGMA query_only = {int(only_read)}")
         except sqlite3.Error as error:
             self._db.close()
             raise Unavailable(f"{root / DATABASE} is no usable database: {error}; restore it from a backup") from error

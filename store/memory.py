@@ -17,10 +17,12 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from core.errors import Conflict, Unavailable
+from core.errors import Conflict, NotFound, Unavailable
 from store.audit import Audit
+from store.backup import Backup, back_up
 from store.categories import Categories
-from store.connection import Connection
+from store.check import CheckReport, Progress, Sizes, check, sizes
+from store.connection import DATABASE, Connection
 from store.goals import Goals
 from store.instances import Instances
 from store.observations import Observations
@@ -28,6 +30,7 @@ from store.records import AuditEntry
 from store.requests import Requests
 from store.retention import Retention
 from store.scans import Scans
+from store.schema import outdated
 from store.sweep import purge, seal, sweep
 from store.undo import undo
 
@@ -35,7 +38,7 @@ from store.undo import undo
 class Memory:
     """An open memory; safe to use from several threads."""
 
-    def __init__(self, connection: Connection, lock: TextIOWrapper) -> None:
+    def __init__(self, connection: Connection, lock: TextIOWrapper | None) -> None:
         self._connection = connection
         self._lock = lock
         self.folder = connection.root
@@ -62,6 +65,7 @@ class Memory:
         try:
             seal(connection)
             memory = cls(connection, lock)
+            memory.requests.recover()
             memory.prune()
             sweep(connection)
         except BaseException:
@@ -69,6 +73,18 @@ class Memory:
             lock.close()
             raise
         return memory
+
+    @classmethod
+    def reading(cls, folder: Path) -> Memory:
+        """The memory in `folder` beside the process that has it open, or while none has: to look, check, back up and export.
+
+        Changing it raises Unavailable. Raises NotFound where there is none, Conflict where a process of another version has it open.
+        """
+        if not (folder / DATABASE).is_file():
+            raise NotFound(f"no memory is in {folder}; name its folder, or set ONELOOK_DATA_DIR")
+        if outdated(folder / DATABASE):
+            cls.open(folder).close()
+        return cls(Connection(folder, only_read=True), None)
 
     @property
     def version(self) -> int:
@@ -122,6 +138,18 @@ class Memory:
         self.requests.prune()
         purge(self._connection)
 
+    def check(self, progress: Progress | None = None) -> CheckReport:
+        """Reads everything once, and names what is damaged and what still works."""
+        return check(self._connection, progress)
+
+    def sizes(self) -> Sizes:
+        """How much there is."""
+        return sizes(self._connection)
+
+    def backup(self, folder: Path, progress: Progress | None = None) -> Backup:
+        """Copies the memory, while it is used, to a folder that does not exist yet. Raises Conflict and Unavailable."""
+        return back_up(self._connection, folder, progress)
+
     def ping(self) -> None:
         """Raises Unavailable where the database does not answer."""
         self._connection.rows("SELECT 1")
@@ -129,7 +157,8 @@ class Memory:
     def close(self) -> None:
         """Closes the file and lets other processes in."""
         self._connection.close()
-        self._lock.close()
+        if self._lock is not None:
+            self._lock.close()
 
     def __enter__(self) -> Memory:
         return self

@@ -50,8 +50,6 @@ class Requests:
         self._connection = connection
         self._lock = threading.Lock()
         self._running: set[tuple[str, str]] = set()
-        with connection.housekeeping() as db:
-            db.execute("DELETE FROM requests WHERE status IS NULL AND result_id IS NULL")  # killed before they changed anything
 
     @contextmanager
     def once(self, key: str, route: str, digest: str) -> Iterator[Once]:
@@ -80,6 +78,11 @@ class Requests:
             finally:
                 with self._lock:
                     self._running.discard(request)
+
+    def recover(self) -> None:
+        """Forgets requests that a stopped process began and that changed nothing: they may be sent again."""
+        with self._connection.housekeeping() as db:
+            db.execute("DELETE FROM requests WHERE status IS NULL AND result_id IS NULL")
 
     def prune(self) -> None:
         """Forgets keys that are older than the retention says."""

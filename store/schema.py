@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import hashlib
+import sqlite3
+from pathlib import Path
 
 from sqlite_utils import Database, Migrations
 from sqlite_utils.db import ForeignKey
@@ -22,6 +24,15 @@ def upgrade(db: Database) -> None:
             f"the memory was made by a later version of OneLook (steps unknown here: {', '.join(later)}); upgrade onelook to open it"
         )
     migrations.apply(db)
+
+
+def outdated(database: Path) -> bool:
+    """Whether opening this file would change its tables."""
+    try:
+        with Database(sqlite3.connect(database)) as db:
+            return bool(migrations.pending(db))
+    except sqlite3.Error:  # whoever opens it says what is wrong with it
+        return False
 
 
 @migrations()

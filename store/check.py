@@ -1,0 +1,137 @@
+"""Finding what is damaged: every file against its checksum, every token, and the database's own consistency."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+from store.columns import files_from_json
+from store.connection import DATABASE, Connection, Row
+from store.folders import Files, problem
+from store.instances import damaged
+from store.sweep import FOLDERS
+
+Progress = Callable[[int, int], None]
+"""Told how many bytes of how many are done."""
+Kind = Literal["database", "category", "instance", "observation", "scan"]
+KINDS: dict[str, Kind] = {"categories": "category", "observations": "observation", "scan_bursts": "scan"}
+
+
+@dataclass(frozen=True)
+class Damage:
+    """One thing that is not what was written."""
+
+    kind: Kind
+    id: str | None
+    """Of the category, instance, observation or scan."""
+    name: str | None
+    """What people call the category."""
+    file: str
+    """Below the memory's folder."""
+    problem: str
+    consequence: str
+    """What no longer works, and what still does."""
+
+
+@dataclass(frozen=True)
+class CheckReport:
+    """What was looked at, and what was found."""
+
+    categories: int
+    files: int
+    size: int
+    """Bytes of these files."""
+    damages: tuple[Damage, ...]
+
+    @property
+    def ok(self) -> bool:
+        """Whether everything is what was written."""
+        return not self.damages
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """How much a memory holds."""
+
+    categories: int
+    instances: int
+    observations: int
+    scans: int
+    """In progress."""
+    goals: int
+    size: int
+    """Bytes on disk, the bin included."""
+
+
+def check(connection: Connection, progress: Progress | None = None) -> CheckReport:
+    """Reads everything once; others may go on changing the memory meanwhile."""
+    damages = _database(connection) + _instances(connection)
+    folders = [(table, row, files_from_json(row["files"])) for table, query in FOLDERS.items() for row in connection.rows(query)]
+    total = sum(_size(files) for _, _, files in folders)
+    done = 0
+    for table, row, files in folders:
+        found = {name: wrong for name, file in files.items() if (wrong := problem(connection.root / row["folder"] / name, file))}
+        if found and connection.rows(f"SELECT 1 FROM {table} WHERE id = ?", row["id"]):  # else it was removed meanwhile
+            damages += [_of_file(connection, table, row, name, wrong) for name, wrong in found.items()]
+        done += _size(files)
+        if progress is not None:
+            progress(done, total)
+    living = connection.rows("SELECT count(*) AS count FROM categories WHERE removed_by IS NULL")[0]["count"]
+    return CheckReport(living, sum(len(files) for _, _, files in folders), total, tuple(damages))
+
+
+def sizes(connection: Connection) -> Sizes:
+    """Counts of what lives, and bytes of all that is kept."""
+    count = {
+        "categories": "SELECT count(*) AS n FROM categories WHERE removed_by IS NULL",
+        "instances": "SELECT count(*) AS n FROM instances i JOIN categories c ON c.id = i.category_id "
+        "WHERE i.removed_by IS NULL AND c.removed_by IS NULL",
+        "observations": "SELECT count(*) AS n FROM observations",
+        "scans": "SELECT count(*) AS n FROM scans WHERE state IN ('requested', 'collecting')",
+        "goals": "SELECT count(*) AS n FROM goals g JOIN categories c ON c.id = g.category_id WHERE c.removed_by IS NULL",
+    }
+    kept = sum(_size(files_from_json(row["files"])) for query in FOLDERS.values() for row in connection.rows(query))
+    size = kept + (connection.root / DATABASE).stat().st_size
+    return Sizes(**{name: connection.rows(query)[0]["n"] for name, query in count.items()}, size=size)
+
+
+def _size(files: Files) -> int:
+    return sum(file.size for file in files.values())
+
+
+def _database(connection: Connection) -> list[Damage]:
+    consequence = "what its rows say may be wrong or missing; restore the memory from a backup"
+    found = [str(row["integrity_check"]) for row in connection.rows("PRAGMA integrity_check(10)")]
+    found = [] if found == ["ok"] else found
+    found += [f"a row of {row['table']} names one of {row['parent']} that is gone" for row in connection.rows("PRAGMA foreign_key_check")]
+    return [Damage("database", None, None, DATABASE, each, consequence) for each in found]
+
+
+def _instances(connection: Connection) -> list[Damage]:
+    columns = "i.id, i.cls, i.pooled, i.tokens_sha256, c.name"
+    rows = connection.rows(f"SELECT {columns} FROM instances i JOIN categories c ON c.id = i.category_id WHERE i.removed_by IS NULL")
+    consequence = "it is left out of the decision; its category is recognised by its other instances, if it has any"
+    problem = "its tokens are not what was written"
+    return [Damage("instance", row["id"], row["name"], DATABASE, problem, consequence) for row in rows if damaged(row)]
+
+
+def _of_file(connection: Connection, table: str, row: Row, name: str, wrong: str) -> Damage:
+    kind = KINDS[table]
+    called = None
+    if kind == "category":
+        (category,) = connection.rows("SELECT name, removed_by FROM categories WHERE id = ?", row["id"])
+        called = category["name"]
+        if category["removed_by"] is not None:
+            consequence = "it is deleted or merged; undoing that brings it back damaged"
+        elif name.endswith(".npz"):
+            consequence = (
+                "it has no poses; it is still recognised, and every other category works; import it again, restore it, or delete it"
+            )
+        else:
+            consequence = "this picture, and computing the category anew with another backbone; it is still recognised and has poses"
+    elif kind == "observation":
+        consequence = "its pictures; nothing that was learnt, unless another backbone should compute it anew"
+    else:
+        consequence = "this scan cannot become a category; delete it and begin another"
+    return Damage(kind, row["id"], called, f"{row['folder']}/{name}", wrong, consequence)

@@ -1,0 +1,166 @@
+"""What is damaged is named, with what it stops; the rest goes on."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from core.encode import EncodedBurst
+from core.errors import Conflict, NotFound, Unavailable
+from core.reference import Reference
+from core.scan import ScanRequest
+from core.views import Burst
+from store.memory import Memory
+from store.observations import Answer
+from store.records import Category
+
+NOVEL = Answer("novel", None, None, None, None, None, None, {})
+
+
+@pytest.fixture
+def full(memory: Memory, category: Category, other: Category, burst: Burst, request_for_views: ScanRequest) -> Memory:
+    """Two categories, an observation and a scan in progress."""
+    memory.observations.create(NOVEL, burst, {"a": np.arange(3)})
+    memory.scans.add(memory.scans.create(request_for_views).id, burst)
+    return memory
+
+
+def flip(path: Path) -> None:
+    """Changes one bit in the middle of a file."""
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    path.write_bytes(content)
+
+
+def test_a_whole_memory_is_ok(full: Memory) -> None:
+    told: list[tuple[int, int]] = []
+    report = full.check(lambda done, total: told.append((done, total)))
+    assert (report.ok, report.categories) == (True, 2)
+    assert report.files == 2 * (3 * 3 + 2) + (3 * 3 + 2) + (3 * 3 + 1)
+    assert told[-1] == (report.size, report.size)
+    assert report.size == sum(path.stat().st_size for path in full.folder.rglob("*") if path.suffix in (".png", ".npz", ".json"))
+
+
+@pytest.mark.parametrize("name", ["001_rgb.png", "001_depth.png", "001_mask.png", "cameras.json", "reference.npz"])
+def test_one_bit_of_any_file_is_noticed(full: Memory, category: Category, name: str) -> None:
+    flip(full.categories.folder(category.id) / name)
+    (damage,) = full.check().damages
+    assert (damage.kind, damage.id, damage.name, damage.file) == ("category", category.id, "cup", f"categories/{category.id}/{name}")
+    assert "SHA-256" in damage.problem
+
+
+def test_a_missing_and_a_short_file_are_told_apart(full: Memory, category: Category) -> None:
+    folder = full.categories.folder(category.id)
+    (folder / "000_rgb.png").unlink()
+    (folder / "001_rgb.png").write_bytes(b"")
+    assert ["is missing" in each.problem or "has 0 bytes" in each.problem for each in full.check().damages] == [True, True]
+
+
+def test_a_damaged_category_stops_neither_its_recognition_nor_the_others(full: Memory, category: Category, other: Category) -> None:
+    flip(full.categories.folder(category.id) / "reference.npz")
+    (damage,) = full.check().damages
+    assert "no poses" in damage.consequence
+    assert "recognised" in damage.consequence
+    with pytest.raises(Unavailable):
+        full.categories.reference(category.id)
+    assert len(full.categories.reference(other.id).views) == 3
+    assert {member.category_id for member in full.categories.members()} == {category.id, other.id}
+    full.close()
+    with Memory.open(full.folder) as again:
+        assert len(again.categories.all()) == 2
+        again.categories.delete(category.id)
+
+
+def test_damaged_views_of_observations_and_scans_are_named_as_such(full: Memory) -> None:
+    for kind in ("observations", "scans"):
+        flip(next((full.folder / kind).rglob("000_rgb.png")))
+    assert {damage.kind for damage in full.check().damages} == {"observation", "scan"}
+
+
+def test_damaged_tokens_are_named(full: Memory, category: Category) -> None:
+    with full._connection.change() as db:
+        db.execute("UPDATE instances SET pooled = zeroblob(length(pooled)) WHERE category_id = ?", [category.id])
+    (damage,) = full.check().damages
+    assert (damage.kind, damage.name) == ("instance", "cup")
+
+
+def test_a_damaged_table_is_named(full: Memory) -> None:
+    with full._connection.housekeeping() as db:
+        db.execute("PRAGMA writable_schema = ON")
+        db.execute(
+            "UPDATE sqlite_schema SET sql = replace(sql, '\"views\" INTEGER NOT NULL', '\"views\" INTEGER NOT NULL CHECK (0)') WHERE name = 'instances'"
+        )
+        db.execute("PRAGMA writable_schema = RESET")
+    assert {damage.kind for damage in full.check().damages} == {"database"}
+
+
+def test_a_memory_is_checked_beside_the_process_that_has_it_open(full: Memory) -> None:
+    with Memory.reading(full.folder) as reader:
+        assert reader.check().ok
+        assert reader.sizes() == full.sizes()
+        with pytest.raises(Unavailable, match="readonly"):
+            reader.categories.rename(reader.categories.all()[0].id, "x")
+        full.categories.rename(full.categories.all()[0].id, "y")
+        assert reader.categories.all()[0].name == "y"
+
+
+def test_where_no_memory_is_none_is_made(folder: Path) -> None:
+    with pytest.raises(NotFound, match="no memory is in"):
+        Memory.reading(folder)
+    assert not folder.exists()
+
+
+def test_sizes_count_what_lives(full: Memory, category: Category, reference: Reference, encoded: EncodedBurst) -> None:
+    full.categories.delete(category.id)
+    found = full.sizes()
+    assert (found.categories, found.instances, found.observations, found.scans, found.goals) == (1, 1, 1, 1, 0)
+    assert found.size > full.check().size
+
+
+def test_a_backup_is_a_memory(full: Memory, tmp_path: Path, category: Category) -> None:
+    backup = full.backup(tmp_path / "backups" / "monday")
+    assert (backup.files, backup.damages) == (full.check().files, ())
+    version = full.version
+    full.categories.delete(category.id)
+    with Memory.open(backup.folder) as copy:
+        assert copy.version == version
+        assert copy.check().ok
+        assert [each.name for each in copy.categories.all()] == ["cup", "mug"]
+
+
+def test_a_backup_never_replaces_anything(full: Memory, tmp_path: Path) -> None:
+    full.backup(tmp_path / "a")
+    with pytest.raises(Conflict, match="exists"):
+        full.backup(tmp_path / "a")
+
+
+def test_a_backup_copes_with_what_is_removed_meanwhile(full: Memory, tmp_path: Path, burst: Burst, request_for_views: ScanRequest) -> None:
+    scan = full.scans.create(request_for_views)
+    full.scans.add(scan.id, burst)
+    left = [scan.id]
+
+    def remove_once(done: int, total: int) -> None:
+        if left:
+            full.scans.delete(left.pop())
+
+    with Memory.reading(full.folder) as reader:
+        backup = reader.backup(tmp_path / "a", remove_once)
+    assert backup.damages == ()
+    with Memory.open(backup.folder) as copy:
+        assert copy.check().ok
+        assert copy.sizes().scans == 1
+
+
+def test_a_backup_names_what_was_damaged_before(full: Memory, tmp_path: Path, category: Category) -> None:
+    (full.categories.folder(category.id) / "000_rgb.png").unlink()
+    (damage,) = full.backup(tmp_path / "a").damages
+    assert damage.file == f"categories/{category.id}/000_rgb.png"
+
+
+def test_a_backup_that_cannot_be_written_leaves_nothing(full: Memory, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(Unavailable, match="choose another folder"):
+        full.backup(tmp_path / "file" / "a")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["file", "memory"]
