@@ -203,13 +203,21 @@ def reference_files(reference: Reference, burst: Burst) -> Callable[[Path], None
 
 
 def insert_category(
-    db: Database, category_id: str, reference: Reference, views: int, files: Files, *, name: str | None, origin_id: str | None = None
+    db: Database,
+    category_id: str,
+    reference: Reference,
+    views: int,
+    files: Files,
+    *,
+    name: str | None,
+    origin_id: str | None = None,
+    created_at: str | None = None,
 ) -> None:
-    """The row of a category, within a transaction."""
+    """The row of a category, within a transaction; an imported one brings where and when it was learnt."""
     row = {
         "id": category_id,
         "name": name,
-        "created_at": now(),
+        "created_at": created_at or now(),
         "views": views,
         "origin_id": origin_id or category_id,
     }

@@ -9,11 +9,11 @@ from typing import Literal
 from store.columns import files_from_json
 from store.connection import DATABASE, Connection, Row
 from store.folders import Files, problem
-from store.instances import damaged
+from store.instances import TOKENS, damaged
 from store.sweep import FOLDERS
 
 Progress = Callable[[int, int], None]
-"""Told how many bytes of how many are done."""
+"""Told how much of how much is done; bytes unless it says otherwise."""
 Kind = Literal["database", "category", "instance", "observation", "scan"]
 KINDS: dict[str, Kind] = {"categories": "category", "observations": "observation", "scan_bursts": "scan"}
 
@@ -109,8 +109,10 @@ def _database(connection: Connection) -> list[Damage]:
 
 
 def _instances(connection: Connection) -> list[Damage]:
-    columns = "i.id, i.cls, i.pooled, i.tokens_sha256, c.name"
-    rows = connection.rows(f"SELECT {columns} FROM instances i JOIN categories c ON c.id = i.category_id WHERE i.removed_by IS NULL")
+    columns = ", ".join(f"i.{name}" for name in ("id", *TOKENS, "tokens_sha256"))
+    rows = connection.rows(
+        f"SELECT {columns}, c.name FROM instances i JOIN categories c ON c.id = i.category_id WHERE i.removed_by IS NULL"
+    )
     consequence = "it is left out of the decision; its category is recognised by its other instances, if it has any"
     problem = "its tokens are not what was written"
     return [Damage("instance", row["id"], row["name"], DATABASE, problem, consequence) for row in rows if damaged(row)]

@@ -25,6 +25,8 @@ from store.retention import now
 
 COLUMNS = "i.id, i.category_id, i.created_at, i.source, i.source_id, i.how, i.similarity, i.views, i.pictures"
 LIVING = "FROM instances i JOIN categories c ON c.id = i.category_id WHERE i.removed_by IS NULL AND c.removed_by IS NULL"
+TOKENS = ("cls", "pooled")
+"""The columns that hold them."""
 Tokens = tuple[Array, Array]
 """[CLS] and pooled, shapes (V, D)."""
 log = logging.getLogger("onelook.store")
@@ -78,7 +80,7 @@ class Instances:
         """Tokens by instance; what was read once stays in memory."""
         kept = {each: tokens for each, tokens in self._tokens.items() if each in wanted}
         new = json.dumps(sorted(wanted - kept.keys()))
-        query = "SELECT id, views, cls, pooled, tokens_sha256 FROM instances WHERE id IN (SELECT value FROM json_each(?))"
+        query = f"SELECT id, views, {', '.join(TOKENS)}, tokens_sha256 FROM instances WHERE id IN (SELECT value FROM json_each(?))"
         for row in self._connection.rows(query, new):
             kept[row["id"]] = None if damaged(row) else (from_blob(row["cls"], row["views"]), from_blob(row["pooled"], row["views"]))
             if kept[row["id"]] is None:
@@ -89,18 +91,18 @@ class Instances:
 
 def damaged(row: Row) -> bool:
     """Whether the tokens of an instance's row are not what was written."""
-    return bool(tokens_sha256(row["cls"], row["pooled"]) != row["tokens_sha256"])
+    return bool(tokens_sha256(row) != row["tokens_sha256"])
 
 
-def tokens_sha256(cls: bytes, pooled: bytes) -> str:
-    """Checksum of an instance's two BLOBs."""
-    return hashlib.sha256(cls + pooled).hexdigest()
+def tokens_sha256(row: Row) -> str:
+    """Checksum of an instance's tokens, which are BLOBs."""
+    return hashlib.sha256(b"".join(row[name] or b"" for name in TOKENS)).hexdigest()
 
 
 def token_columns(encoded: EncodedBurst) -> Row:
     """The columns of an instance that a backbone computed."""
-    cls, pooled = to_blob(encoded.cls), to_blob(encoded.pooled)
-    return {"views": len(encoded.cls), "cls": cls, "pooled": pooled, "tokens_sha256": tokens_sha256(cls, pooled)}
+    row: Row = {name: to_blob(getattr(encoded, name)) for name in TOKENS}
+    return row | {"views": len(encoded.cls), "tokens_sha256": tokens_sha256(row)}
 
 
 def insert_instance(

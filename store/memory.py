@@ -12,18 +12,21 @@ from __future__ import annotations
 
 import fcntl
 import json
+from collections.abc import Sequence
 from io import TextIOWrapper
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
 from core.errors import Conflict, NotFound, Unavailable
+from store.archive import Export, export
 from store.audit import Audit
 from store.backup import Backup, back_up
 from store.categories import Categories
 from store.check import CheckReport, Progress, Sizes, check, sizes
 from store.connection import DATABASE, Connection
 from store.goals import Goals
+from store.imports import Import, import_archive
 from store.instances import Instances
 from store.observations import Observations
 from store.records import AuditEntry
@@ -149,6 +152,21 @@ class Memory:
     def backup(self, folder: Path, progress: Progress | None = None) -> Backup:
         """Copies the memory, while it is used, to a folder that does not exist yet. Raises Conflict and Unavailable."""
         return back_up(self._connection, folder, progress)
+
+    def export(self, path: Path, category_ids: Sequence[str] | None = None, progress: Progress | None = None) -> Export:
+        """Writes categories, all of them where none are named, to a file that does not exist yet. `progress` counts categories.
+
+        Raises NotFound, Conflict where the file exists or there is nothing to export, Unavailable where something is damaged.
+        """
+        return export(self._connection, self.categories, path, category_ids, progress)
+
+    def import_archive(self, path: Path, *, actor: str | None = None, progress: Progress | None = None) -> Import:
+        """Takes the categories of another memory's export, all of them or none; those it has already are left as they are.
+
+        `progress` counts categories. Raises InvalidInput where the archive is not in order, Conflict where it was made with another
+        backbone, Unavailable where it cannot be read or kept.
+        """
+        return import_archive(self._connection, path, self.categories.all(), actor=actor, progress=progress)
 
     def ping(self) -> None:
         """Raises Unavailable where the database does not answer."""

@@ -87,11 +87,10 @@ def test_damaged_tokens_are_named(full: Memory, category: Category) -> None:
 
 
 def test_a_damaged_table_is_named(full: Memory) -> None:
+    impossible = """UPDATE sqlite_schema SET sql = replace(sql, '"views" INTEGER', '"views" INTEGER CHECK (0)') WHERE name = 'instances'"""
     with full._connection.housekeeping() as db:
         db.execute("PRAGMA writable_schema = ON")
-        db.execute(
-            "UPDATE sqlite_schema SET sql = replace(sql, '\"views\" INTEGER NOT NULL', '\"views\" INTEGER NOT NULL CHECK (0)') WHERE name = 'instances'"
-        )
+        db.execute(impossible)
         db.execute("PRAGMA writable_schema = RESET")
     assert {damage.kind for damage in full.check().damages} == {"database"}
 
