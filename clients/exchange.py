@@ -25,7 +25,7 @@ from clients.errors import ServiceProblem, TooSlow, Unreachable, problem_from_js
 T = TypeVar("T")
 KEY = "Idempotency-Key"
 TRY_AGAIN = frozenset({429, 502, 503, 504})
-"""Statuses of a service, or a proxy before it, that is busy or restarting."""
+"""Statuses of a service, or a proxy before it, that is busy or restarting; any other is worth another attempt only if it has Retry-After."""
 PROBLEM = "application/problem+json"
 
 
@@ -88,13 +88,12 @@ def _wait_s(came: httpx.Response | httpx.TransportError, attempt: int, retry: Re
     """How long to wait before the next attempt; None where another one would not help."""
     backoff_s = min(retry.longest_s, retry.first_s * 2 ** (attempt - 1)) * jitter.uniform(0.5, 1)
     if isinstance(came, httpx.Response):
-        if came.status_code not in TRY_AGAIN:
-            return None
         asked_s = retry_after_s(came.headers)
-        if asked_s is None:
-            # A service that knows what is missing (weights, disk) says so in a problem: waiting does not mend it.
-            return None if came.headers.get("content-type", "").startswith(PROBLEM) and came.status_code == 503 else backoff_s
-        return None if asked_s > retry.longest_s else max(asked_s, backoff_s)
+        if asked_s is not None:
+            return None if asked_s > retry.longest_s else max(asked_s, backoff_s)
+        # A service that says itself what it lacks (weights, disk) would name a time if waiting mended it.
+        told = came.status_code == 503 and came.headers.get("content-type", "").startswith(PROBLEM)
+        return backoff_s if came.status_code in TRY_AGAIN and not told else None
     return None if isinstance(came, (httpx.ReadTimeout, httpx.WriteTimeout)) else backoff_s
 
 

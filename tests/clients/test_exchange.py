@@ -112,6 +112,13 @@ def test_a_busy_service_is_asked_again_when_it_says(connect: Connect, waits: lis
     assert waits == [7, 2]
 
 
+def test_a_request_that_is_still_being_carried_out_is_asked_for_again(connect: Connect, waits: list[float]) -> None:
+    robot, turns = connect(BROKEN, problem(409, "conflict", **{"retry-after": "1"}), httpx.Response(200, json=SCAN))
+    assert robot.scan(BURST).id == "s"
+    assert waits[1] == 1
+    assert len(set(turns.keys)) == 1
+
+
 def test_a_service_that_asks_for_patience_beyond_ours_is_unavailable(connect: Connect, waits: list[float]) -> None:
     robot, turns = connect(problem(503, "unavailable", **{"retry-after": "600"}))
     with pytest.raises(errors.UnavailableProblem, match="all lanes are taken") as caught:
