@@ -18,7 +18,7 @@ from benchmarks.episodes import Counts, draw_orders, episode
 from benchmarks.pair_scores import PARTS, FloatArray, PairScores, auroc
 from benchmarks.parallel import map_jobs
 from benchmarks.tables import Row, print_table, write_json
-from clients.datasets import folders
+from clients.datasets.sources import find_sequences
 from core.backbones.dino import load_backbone
 from core.encode import Encoder
 from core.errors import InvalidInput
@@ -64,7 +64,7 @@ def run(
     """
     for score in scores:
         named_score(score)
-    sequences = folders.find_sequences(data)
+    sequences = find_sequences(data)
     names, labels = np.unique([sequence.category for sequence in sequences], return_inverse=True)
     if len(names) < 2 or np.bincount(labels).max() < 2:
         raise InvalidInput("data", "discovery needs two categories, and two objects of one of them")

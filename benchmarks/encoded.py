@@ -56,8 +56,8 @@ def read_encoded(file: Path) -> EncodedBurst:
 
 def _key(sequence: folders.Sequence, encoder: Encoder) -> str:
     digest = hashlib.sha256(f"{encoder.backbone.fingerprint} {encoder.config} {_code_hash()}".encode())
-    files = [*sequence.images, *sorted((sequence.path / "depth").glob("*.png")), sequence.path / "scene_camera.json"]
-    for file in files:
+    digest.update(sequence.reader.cameras(sequence).encode())
+    for file in sequence.reader.files(sequence):
         if file.exists():
             digest.update(f"{file.relative_to(sequence.path)}\0".encode() + hashlib.sha256(file.read_bytes()).digest())
     return digest.hexdigest()[:32]

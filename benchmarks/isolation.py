@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from benchmarks.encoded import encode_all, read_encoded
 from benchmarks.tables import print_table, write_json
 from clients.datasets import folders
+from clients.datasets.sources import find_sequences
 from core.backbones.dino import load_backbone
 from core.encode import EncodedView, Encoder, EncoderConfig
 from core.errors import InvalidInput
@@ -59,7 +60,7 @@ def run(
 
     Raises InvalidInput where no sequence has silhouettes, or for a source that the backbone does not have.
     """
-    groups = folders.by_category(folders.find_sequences(data)).values()
+    groups = folders.by_category(find_sequences(data)).values()
     sequences = [sequence for group in groups for sequence in group[: DEFAULT_LIMIT if limit is None else limit]]
     sequences = [sequence for sequence in sequences if any((sequence.path / "mask_visib").glob("*.png"))]
     if not sequences:

@@ -58,7 +58,9 @@ def sample_pairs(sequences: Sequence[folders.Sequence], limit: int, seed: int) -
         raise InvalidInput("data", "no category has two instances, so there is no pair to estimate")
     for sequence in {sequence for pair in pairs for sequence in pair}:
         if sequence.world_from_model is None:
-            raise InvalidInput(str(sequence.path), "has no scene_gt.json with scene_camera.json, which the pose benchmark scores against")
+            raise InvalidInput(
+                str(sequence.path), "has no true pose (scene_gt.json, class_labels), which the pose benchmark scores against"
+            )
     return pairs
 
 

@@ -1,4 +1,4 @@
-"""Accuracy of the 7-D pose between instances of a category: the paper's experiment on any folder in the data layout.
+"""Accuracy of the 7-D pose between instances of a category: the paper's experiment on any data set with true poses.
 
 A seeded sample of the ordered pairs of different instances of each category is estimated, with the product's own crop, and
 with ground truth only for scoring. A pose that the estimator refuses counts as 180°. A row is one category, or "all": the
@@ -23,6 +23,7 @@ from benchmarks.pairs import Pair, ViewCounts, choose_views, sample_pairs
 from benchmarks.parallel import map_jobs, worker_count
 from benchmarks.tables import print_table, write_json
 from clients.datasets import folders
+from clients.datasets.sources import find_sequences
 from clients.pose_error import NO_POSE, PoseError, accuracy, median, pose_error
 from core.backbones.dino import load_backbone
 from core.boxes import remove_outliers
@@ -85,8 +86,8 @@ class Job:
     setting: Setting
     reference: folders.Sequence
     targets: tuple[folders.Sequence, ...]
-    files: dict[Path, Path]
-    """The encoded views of each sequence, by its folder."""
+    files: dict[str, Path]
+    """The encoded views of each sequence, by its key."""
     seed: int
 
 
@@ -121,6 +122,13 @@ class PoseRow:
     median_log_scale: float
     median_iou: float
     """Of the box around the reference, carried by the estimate, and the target's, percent; both along the model's axes."""
+    median_t_2pi: float | None
+    """Median translation error where the target's longest side counts as 2π, as in CO3D (paper, "Translation estimation performance").
+    This and the next three are None where the data do not tell the longest side."""
+    acc_t1_0: float | None
+    acc_t0_5: float | None
+    """Percentage of estimates whose centre is at most this far off, in the same unit."""
+    acc_t0_2: float | None
     solve_ms: float
     """Median time of one estimate, one thread, features and reference already there."""
     memory_mb: float
@@ -139,6 +147,8 @@ class PoseRow:
 COLUMNS = tuple(field.name for field in fields(PoseRow))
 OPTIONS = COLUMNS[COLUMNS.index("method") :]
 """Printed where they differ between rows of a variant."""
+TRANSLATION = ("median_t_2pi", "acc_t1_0", "acc_t0_5", "acc_t0_2")
+"""Printed where there are any."""
 MEAN_COLUMNS = COLUMNS[COLUMNS.index("acc30") : COLUMNS.index("method")]
 """What an "all" row averages over categories."""
 
@@ -154,11 +164,11 @@ def run(data: Path, sweep: Sweep, limit: int | None, json: Path | None, seed: in
     """
     network = load_backbone(backbone)
     settings = sweep.settings(network.dim)
-    pairs = sample_pairs(folders.find_sequences(data), DEFAULT_LIMIT if limit is None else limit, seed)
+    pairs = sample_pairs(find_sequences(data), DEFAULT_LIMIT if limit is None else limit, seed)
     sequences = list(dict.fromkeys(sequence for pair in pairs for sequence in pair))
     _require_views(sequences, [setting.views for setting in settings])
     encoded = encode_all(sequences, Encoder(network))
-    files = {sequence.path: file for sequence, file in zip(sequences, encoded, strict=True)}
+    files = {sequence.key: file for sequence, file in zip(sequences, encoded, strict=True)}
     jobs = [job for setting in settings for job in _jobs(setting, pairs, files, seed)]
     started = time.perf_counter()
     results = map_jobs(solve, jobs, lambda job: len(job.targets), "solving")
@@ -179,7 +189,8 @@ def run(data: Path, sweep: Sweep, limit: int | None, json: Path | None, seed: in
         }
         write_json(json, meta, [asdict(row) for row in rows])
     differing = [name for name in OPTIONS if len({(row.variant, getattr(row, name)) for row in rows}) > len(set(sweep.variants))]
-    print_table(f"Pose, {data}", [asdict(row) for row in rows], [*(name for name in COLUMNS if name not in OPTIONS), *differing])
+    hidden = {*OPTIONS, *(name for name in TRANSLATION if all(getattr(row, name) is None for row in rows))}
+    print_table(f"Pose, {data}", [asdict(row) for row in rows], [*(name for name in COLUMNS if name not in hidden), *differing])
     return rows
 
 
@@ -207,8 +218,14 @@ def table_rows(setting: Setting, results: Sequence[JobResult]) -> list[PoseRow]:
     ordered = sorted(results, key=lambda result: result.job.reference.category)
     groups = groupby(ordered, key=lambda result: result.job.reference.category)
     rows = [_category_row(setting, category, list(group)) for category, group in groups]
-    means = {column: float(np.mean([getattr(row, column) for row in rows])) for column in MEAN_COLUMNS}
+    means = {column: _mean([getattr(row, column) for row in rows]) for column in MEAN_COLUMNS}
     return [*rows, replace(rows[0], category="all", pairs=sum(row.pairs for row in rows), **means)]  # type: ignore[arg-type]
+
+
+def _mean(values: Sequence[float | None]) -> float | None:
+    """None where one of them is."""
+    known = [value for value in values if value is not None]
+    return float(np.mean(known)) if len(known) == len(values) else None
 
 
 def _category_row(setting: Setting, category: str, results: Sequence[JobResult]) -> PoseRow:
@@ -226,6 +243,7 @@ def _category_row(setting: Setting, category: str, results: Sequence[JobResult])
         median_t=median(errors, "translation"),
         median_log_scale=median(errors, "log_scale"),
         median_iou=100 * float(np.median([iou for result in results for iou in result.ious])),
+        **_translation_figures(results),
         solve_ms=float(np.median([ms for result in results for ms in result.solve_ms])),
         memory_mb=float(np.mean([result.memory_mb for result in results])),
         answered=100 * float(np.mean([dof == setting.config.dof for result in results for dof in result.dofs])),
@@ -237,6 +255,18 @@ def _category_row(setting: Setting, category: str, results: Sequence[JobResult])
     )
 
 
+def _translation_figures(results: Sequence[JobResult]) -> dict[str, float | None]:
+    """The translation columns of a row: errors in units of which the target's longest side has 2π."""
+    targets = [each for result in results for each in zip(result.job.targets, result.errors, strict=True)]
+    sizes = [(sequence.world_from_model.scale if sequence.world_from_model else None, sequence.longest_side_m) for sequence, _ in targets]
+    ratios = [scale / longest for scale, longest in sizes if scale and longest]
+    if len(ratios) < len(targets):
+        return dict.fromkeys(TRANSLATION)
+    distances = 2 * np.pi * np.array([error.translation for _, error in targets]) * ratios
+    within = [100 * float((distances <= limit).mean()) for limit in (1.0, 0.5, 0.2)]
+    return dict(zip(TRANSLATION, [float(np.median(distances)), *within], strict=True))
+
+
 def _require_views(sequences: Sequence[folders.Sequence], counts: Sequence[ViewCounts]) -> None:
     most = max(max(count.reference or 0, count.target or 0) for count in counts)
     for sequence in sequences:
@@ -244,7 +274,7 @@ def _require_views(sequences: Sequence[folders.Sequence], counts: Sequence[ViewC
             raise InvalidInput("views", f"{most} were asked for, but {sequence.name} has {len(sequence.images)}; ask for fewer")
 
 
-def _jobs(setting: Setting, pairs: Sequence[Pair], files: dict[Path, Path], seed: int) -> list[Job]:
+def _jobs(setting: Setting, pairs: Sequence[Pair], files: dict[str, Path], seed: int) -> list[Job]:
     targets: dict[folders.Sequence, list[folders.Sequence]] = {}
     for reference, target in pairs:
         targets.setdefault(reference, []).append(target)
@@ -253,7 +283,7 @@ def _jobs(setting: Setting, pairs: Sequence[Pair], files: dict[Path, Path], seed
 
 def _select(job: Job, sequence: folders.Sequence, role: str, count: int | None) -> EncodedBurst:
     indices = choose_views(sequence.name, role, len(sequence.images), count, job.seed)
-    return _cached(job.files[sequence.path]).select(indices)
+    return _cached(job.files[sequence.key]).select(indices)
 
 
 _cached = lru_cache(maxsize=16)(read_encoded)
@@ -274,5 +304,5 @@ def _score(estimate: PoseEstimate | None, reference: Reference, job: Job, sequen
 
 def _model_box(job: Job, sequence: folders.Sequence, world_from_model: Sim3) -> Parallelepiped:
     """Around all that was measured of an object, along its model's axes, in its world."""
-    cloud = remove_outliers(_cached(job.files[sequence.path]).cloud_m)
+    cloud = remove_outliers(_cached(job.files[sequence.key]).cloud_m)
     return Parallelepiped.around(world_from_model.inverse().apply(cloud)).carried_by(world_from_model.as_matrix())

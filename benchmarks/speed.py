@@ -19,6 +19,7 @@ from benchmarks.parallel import bar
 from benchmarks.tables import print_table, write_json
 from clients.datasets import folders
 from clients.datasets.samples import data_or_samples
+from clients.datasets.sources import find_sequences
 from core.backbones.dino import load_backbone
 from core.encode import EncodedBurst, Encoder
 from core.errors import InvalidInput
@@ -133,7 +134,7 @@ def _solve(estimator: PoseEstimator, reference: Reference, target: EncodedBurst)
 
 
 def _two_objects(data: Path, views: int) -> list[folders.Sequence]:
-    for group in folders.by_category(folders.find_sequences(data)).values():
+    for group in folders.by_category(find_sequences(data)).values():
         enough = [sequence for sequence in group if len(sequence.images) >= views]
         if len(enough) > 1:
             return enough[:2]

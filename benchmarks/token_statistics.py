@@ -13,7 +13,8 @@ import numpy as np
 import typer
 from rich.progress import track
 
-from clients.datasets.folders import find_sequences, load_burst
+from clients.datasets.folders import load_burst
+from clients.datasets.sources import find_sequences
 from core.backbones.dino import EMBEDDED, load_backbone
 from core.backbones.whitening import STATISTICS, Whitening
 from core.encode import Encoder

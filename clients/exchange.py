@@ -25,7 +25,7 @@ from clients.errors import ServiceProblem, TooSlow, Unreachable, problem_from_js
 T = TypeVar("T")
 KEY = "Idempotency-Key"
 TRY_AGAIN = frozenset({429, 502, 503, 504})
-"""Statuses of a service, or a proxy before it, that is busy or restarting; any other is worth another attempt only if it has Retry-After."""
+"""Statuses of a service, or a proxy before it, that is busy or restarting; any other one is asked again only if it has Retry-After."""
 PROBLEM = "application/problem+json"
 
 

@@ -9,7 +9,7 @@ import typer
 
 app = typer.Typer(help="Measure accuracy, discovery, speed and isolation.", no_args_is_help=True)
 
-Data = Annotated[Path, typer.Option(help="Folder of recorded objects in the data layout.")]
+Data = Annotated[Path, typer.Option(help="Recorded objects: a folder in the data layout, or bop:, co3d:, transforms: or images:FOLDER.")]
 JsonFile = Annotated[Path | None, typer.Option("--json", help='File for {"meta": …, "rows": …}.')]
 Seed = Annotated[int, typer.Option(help="Of every random choice.")]
 Backbone = Annotated[str, typer.Option(help="dinov2-s14, dino-s8, or a folder of the DINO family.")]

@@ -34,8 +34,8 @@ def simulate(
     \f
     `world` has one kind so far; it is named so that scripts keep working when there are more.
     """
-    from clients.datasets.folders import find_sequences
     from clients.datasets.samples import data_or_samples
+    from clients.datasets.sources import find_sequences
     from clients.robot import RobotClient
     from clients.simulator.episode import Episode, summarise
     from clients.simulator.live import show, summary_table

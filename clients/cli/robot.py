@@ -67,7 +67,7 @@ def scan(
 
 
 def _world(folder: Path) -> ReplayWorld:
-    from clients.datasets.folders import find_sequences
+    from clients.datasets.sources import find_sequences
     from clients.simulator.replay import ReplayWorld
 
     sequences = find_sequences(folder)

@@ -1,4 +1,7 @@
-"""BOP-style folders: one folder a sequence, CATEGORY/INSTANCE/{rgb,depth,mask_visib,scene_*.json,sequence.json}."""
+"""Recorded objects, and the data layout: one folder a sequence, CATEGORY/INSTANCE/{rgb,depth,mask_visib,scene_*.json,sequence.json}.
+
+Other data sets are read by the modules beside this one; `sources.find_sequences` opens any of them.
+"""
 
 from __future__ import annotations
 
@@ -8,11 +11,11 @@ from collections.abc import Iterator
 from collections.abc import Sequence as Indices
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
-import cv2
 import numpy as np
 
+from clients.datasets.images import is_image, read_mask, read_rgb, read_units
 from core.errors import InvalidInput
 from core.sim3 import Sim3
 from core.views import Burst, Camera, FloatArray, View, require_rotation
@@ -21,6 +24,39 @@ ABOUT = "sequence.json"
 """The file that makes a folder a sequence."""
 SYMMETRY_SIDES = {9: 3, 16: 4}
 """Rows of a symmetry's matrix, by how many numbers it has."""
+
+
+class Reader(Protocol):
+    """How the views of a sequence are read."""
+
+    def read(self, sequence: Sequence, indices: Indices[int], masks: bool) -> list[View]:
+        """The views at `indices`; silhouettes where `masks` asks for them and the data have them."""
+        ...
+
+    def files(self, sequence: Sequence) -> list[Path]:
+        """Every file, below the sequence's folder, that its views are read from."""
+        ...
+
+    def cameras(self, sequence: Sequence) -> str:
+        """What decides on the cameras and is in none of these files; empty where nothing is."""
+        ...
+
+
+class LayoutReader:
+    """Reads the data layout."""
+
+    def read(self, sequence: Sequence, indices: Indices[int], masks: bool) -> list[View]:
+        """See `Reader`."""
+        cameras = read_json(sequence.path / "scene_camera.json")
+        return [_load_view(sequence, sequence.images[index], cameras, masks) for index in indices]
+
+    def files(self, sequence: Sequence) -> list[Path]:
+        """See `Reader`."""
+        return [*sequence.images, *sorted((sequence.path / "depth").glob("*.png")), sequence.path / "scene_camera.json"]
+
+    def cameras(self, sequence: Sequence) -> str:
+        """See `Reader`."""
+        return ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,11 +72,19 @@ class Sequence:
     """Ground truth for evaluation: the model frame (unit diagonal, canonical orientation) in this sequence's world, metres."""
     symmetries: tuple[FloatArray, ...]
     """Rotations of the model onto itself, each (3, 3)."""
+    reader: Reader = LayoutReader()
+    longest_side_m: float | None = None
+    """Of the object's box, where the data tell: the unit of the paper's translation figures."""
 
     @property
     def name(self) -> str:
         """`category/instance`."""
         return f"{self.category}/{self.instance}"
+
+    @property
+    def key(self) -> str:
+        """Tells it from every other one: one folder may hold several, and two data sets one name."""
+        return f"{self.path}:{self.name}"
 
 
 def find_sequences(root: Path) -> list[Sequence]:
@@ -61,9 +105,8 @@ def by_category(sequences: Indices[Sequence]) -> dict[str, list[Sequence]]:
 
 def load_burst(sequence: Sequence, indices: Indices[int] | None = None, *, masks: bool = False) -> Burst:
     """The views of `sequence` at `indices` (all where left out); silhouettes only where `masks` asks for them."""
-    cameras = _read_json(sequence.path / "scene_camera.json")
     chosen = range(len(sequence.images)) if indices is None else indices
-    return Burst([_load_view(sequence, sequence.images[index], cameras, masks) for index in chosen])
+    return Burst(sequence.reader.read(sequence, chosen, masks))
 
 
 def _sequence_folders(root: Path) -> Iterator[Path]:
@@ -81,21 +124,21 @@ def _sequence_folders(root: Path) -> Iterator[Path]:
 
 
 def _load_view(sequence: Sequence, image: Path, cameras: dict[str, Any], masks: bool) -> View:
-    rgb = cv2.cvtColor(_read_image(image, cv2.IMREAD_COLOR), cv2.COLOR_BGR2RGB)
+    rgb = read_rgb(image)
     entry = cameras.get(str(int(image.stem)))
     if entry is None or "cam_R_w2c" not in entry:
         return View(rgb)
     depth_file = sequence.path / "depth" / f"{image.stem}.png"
     depth_m = None
     if depth_file.exists():
-        raw = _read_image(depth_file, cv2.IMREAD_UNCHANGED)
-        depth_m = (raw * (entry["depth_scale"] / 1000)).astype(np.float32)
+        depth_m = (read_units(depth_file) * (entry["depth_scale"] / 1000)).astype(np.float32)
     mask_file = sequence.path / "mask_visib" / f"{image.stem}_000000.png"
-    mask = _read_image(mask_file, cv2.IMREAD_GRAYSCALE) > 0 if masks and mask_file.exists() else None
-    return View(rgb, depth_m, _read_camera(entry), mask)
+    mask = read_mask(mask_file) if masks and mask_file.exists() else None
+    return View(rgb, depth_m, read_camera(entry), mask)
 
 
-def _read_camera(entry: dict[str, Any]) -> Camera:
+def read_camera(entry: dict[str, Any]) -> Camera:
+    """From an entry of BOP's scene_camera.json that has a pose."""
     rotation = np.array(entry["cam_R_w2c"], dtype=float).reshape(3, 3)
     world_from_camera = np.eye(4)
     world_from_camera[:3, :3] = rotation.T
@@ -105,13 +148,13 @@ def _read_camera(entry: dict[str, Any]) -> Camera:
 
 def _read_sequence(folder: Path) -> Sequence:
     about = json.loads((folder / ABOUT).read_text())
-    images = tuple(sorted(path for path in (folder / "rgb").iterdir() if path.suffix in {".jpg", ".png"}))
+    images = tuple(sorted(path for path in (folder / "rgb").iterdir() if is_image(path)))
     listed = enumerate(about.get("symmetries") or ())
-    symmetries = tuple(_read_symmetry(matrix, f"{folder / ABOUT}: symmetries[{index}]") for index, matrix in listed)
+    symmetries = tuple(read_symmetry(matrix, f"{folder / ABOUT}: symmetries[{index}]") for index, matrix in listed)
     return Sequence(folder, about["category"], about["instance"], images, _world_from_model(folder, about), symmetries)
 
 
-def _read_symmetry(matrix: Any, field: str) -> FloatArray:
+def read_symmetry(matrix: Any, field: str) -> FloatArray:
     """A rotation, shape (3, 3), from 3×3 numbers, or from the 4×4 of BOP's `symmetries_discrete`; nested or row by row."""
     try:
         numbers = np.array(matrix, dtype=float).ravel()
@@ -126,11 +169,11 @@ def _read_symmetry(matrix: Any, field: str) -> FloatArray:
 
 
 def _world_from_model(folder: Path, about: dict[str, Any]) -> Sim3 | None:
-    truth, cameras = _read_json(folder / "scene_gt.json"), _read_json(folder / "scene_camera.json")
+    truth, cameras = read_json(folder / "scene_gt.json"), read_json(folder / "scene_camera.json")
     if not truth or not cameras:
         return None
     first = next(iter(truth))
-    pose, camera = truth[first][0], _read_camera(cameras[first])
+    pose, camera = truth[first][0], read_camera(cameras[first])
     camera_from_model = Sim3(
         about["model_scale_mm"] / 1000,
         np.array(pose["cam_R_m2c"], dtype=float).reshape(3, 3),
@@ -139,12 +182,6 @@ def _world_from_model(folder: Path, about: dict[str, Any]) -> Sim3 | None:
     return Sim3(1.0, camera.world_from_camera[:3, :3], camera.world_from_camera[:3, 3]) @ camera_from_model
 
 
-def _read_json(path: Path) -> dict[str, Any]:
+def read_json(path: Path) -> dict[str, Any]:
+    """A JSON object; empty where there is no file."""
     return dict(json.loads(path.read_text())) if path.exists() else {}
-
-
-def _read_image(path: Path, flags: int) -> Any:
-    image = cv2.imread(str(path), flags)
-    if image is None:
-        raise InvalidInput(str(path), "is not a readable image")
-    return image

@@ -24,6 +24,7 @@ from .conftest import record
 COLUMNS = {
     *("variant", "views", "dims", "category", "pairs", "acc30", "acc15", "acc7_5"),
     *("median_deg", "median_t", "median_log_scale", "median_iou", "solve_ms", "memory_mb", "answered"),
+    *("median_t_2pi", "acc_t1_0", "acc_t0_5", "acc_t0_2"),
     *("method", "consensus_deg", "inlier_ratio", "estimator", "dof"),
 }
 

@@ -1,0 +1,41 @@
+"""Plain folders of images, without depth and cameras: CATEGORY/INSTANCE/*.jpg. They tell known from novel, and have no pose."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+from clients.datasets import folders
+from clients.datasets.images import is_image, read_rgb
+from core.errors import InvalidInput
+from core.views import View
+
+
+class PhotographReader:
+    """Reads images alone."""
+
+    def read(self, sequence: folders.Sequence, indices: Sequence[int], masks: bool) -> list[View]:
+        """See `folders.Reader`."""
+        return [View(read_rgb(sequence.images[index])) for index in indices]
+
+    def files(self, sequence: folders.Sequence) -> list[Path]:
+        """See `folders.Reader`."""
+        return list(sequence.images)
+
+    def cameras(self, sequence: folders.Sequence) -> str:
+        """See `folders.Reader`."""
+        return ""
+
+
+def find_sequences(root: Path) -> list[folders.Sequence]:
+    """Every folder that holds images, `root` or below it: its category is the folder around it. Raises InvalidInput where there is none."""
+    found = []
+    for name, _, files in sorted(os.walk(root, followlinks=True)):
+        folder = Path(name).resolve()
+        images = tuple(folder / file for file in sorted(files) if is_image(Path(file)))
+        if images:
+            found.append(folders.Sequence(folder, folder.parent.name, folder.name, images, None, (), PhotographReader()))
+    if not found:
+        raise InvalidInput("data", f"no image in or below {root}; expected CATEGORY/INSTANCE/*.jpg")
+    return found

@@ -1,0 +1,34 @@
+"""One door to every data set: FORMAT:FOLDER, or a folder in the data layout."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from clients.datasets import bop, co3d, folders, photographs, transforms
+from core.errors import InvalidInput
+
+FORMATS: dict[str, Callable[[Path], list[folders.Sequence]]] = {
+    "bop": bop.find_sequences,
+    "co3d": co3d.find_sequences,
+    "images": photographs.find_sequences,
+    "transforms": transforms.find_sequences,
+}
+
+
+def find_sequences(data: Path | str) -> list[folders.Sequence]:
+    """Every sequence of a data set, given as `co3d:FOLDER` and the like; a folder alone is in the data layout.
+
+    Raises InvalidInput for an unknown format, a folder that is none, or one without sequences.
+    """
+    prefix, mark, rest = str(data).partition(":")
+    if not mark or Path(data).is_dir():
+        return folders.find_sequences(Path(data))
+    if prefix not in FORMATS:
+        raise InvalidInput(
+            "data", f"{prefix!r} in {str(data)!r} is none of {', '.join(FORMATS)}; a folder in the data layout has no prefix"
+        )
+    root = Path(rest).expanduser()
+    if not root.is_dir():
+        raise InvalidInput("data", f"{root} is no folder")
+    return FORMATS[prefix](root)

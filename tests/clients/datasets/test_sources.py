@@ -1,0 +1,43 @@
+"""The door to every data set."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from clients.datasets.folders import Sequence
+from clients.datasets.sources import FORMATS, find_sequences
+from core.errors import InvalidInput
+
+
+def test_a_folder_alone_is_in_the_data_layout(samples: list[Sequence]) -> None:
+    root = samples[0].path.parents[1]
+    names = [each.name for each in samples]
+    assert [each.name for each in find_sequences(root)] == [each.name for each in find_sequences(str(root))] == names
+
+
+def test_a_prefix_names_the_format(tmp_path: Path) -> None:
+    cv2.imwrite(str(tmp_path / "a.png"), np.zeros((40, 40, 3), np.uint8))
+    (sequence,) = find_sequences(f"images:{tmp_path}")
+    assert sequence.images == (tmp_path / "a.png",)
+    assert find_sequences(Path(f"images:{tmp_path}"))[0].name == sequence.name
+
+
+def test_a_folder_with_a_colon_is_still_a_folder(tmp_path: Path) -> None:
+    (tmp_path / "co3d:cup").mkdir()
+    with pytest.raises(InvalidInput, match=r"sequence\.json"):
+        find_sequences(tmp_path / "co3d:cup")
+
+
+@pytest.mark.parametrize("data", ["kitti:/data", "https://example.org"])
+def test_an_unknown_format_is_named_beside_those_there_are(data: str) -> None:
+    with pytest.raises(InvalidInput, match=", ".join(FORMATS)):
+        find_sequences(data)
+
+
+def test_a_folder_that_is_none_is_named() -> None:
+    with pytest.raises(InvalidInput, match="/nowhere is no folder"):
+        find_sequences("bop:/nowhere")

@@ -1,0 +1,145 @@
+"""Folders with a transforms.json, as Instant-NGP, nerfstudio and NeRF write them, written here and read back."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+from clients.datasets import transforms
+from clients.datasets.folders import load_burst
+from core.errors import InvalidInput
+
+OPENGL = np.diag([1.0, -1.0, -1.0, 1.0])
+INTRINSICS = {"w": 64, "h": 48, "fl_x": 70.0, "fl_y": 72.0, "cx": 31.0, "cy": 26.0}
+"""The shots' K; its principal point (30.5, 25.5) counts from the first pixel's centre, these from the image's corner."""
+
+
+def write(
+    folder: Path, shots: list[Any], scene: dict[str, Any], frame: Callable[[int, Any], dict[str, Any]], name: str = "transforms.json"
+) -> Path:
+    """Images, and a file whose frames have what `frame` says beside their image and pose."""
+    (folder / "images").mkdir(parents=True)
+    frames = []
+    for number, shot in enumerate(shots):
+        cv2.imwrite(str(folder / "images" / f"{number:04}.png"), shot.rgb[..., ::-1])
+        pose = (shot.camera.world_from_camera @ OPENGL).tolist()
+        frames.append({"file_path": f"images/{number:04}.png", "transform_matrix": pose, **frame(number, shot)})
+    (folder / name).write_text(json.dumps({**scene, "frames": frames}))
+    return folder
+
+
+def depth_png(folder: Path, number: int, shot: Any, unit_m: float) -> str:
+    path = folder / "depth" / f"{number:04}.png"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    cv2.imwrite(str(path), np.round(shot.depth_m / unit_m).astype(np.uint16))
+    return f"depth/{number:04}.png"
+
+
+def test_instant_ngp_without_depth(tmp_path: Path, shots: list[Any], prove: Callable[..., None]) -> None:
+    write(tmp_path / "cup" / "blue", shots, INTRINSICS | {"aabb_scale": 4, "k1": 0, "k2": 0, "p1": 0, "p2": 0}, lambda n, shot: {})
+    (sequence,) = transforms.find_sequences(tmp_path)
+    assert sequence.name == "cup/blue"
+    prove(sequence, depth=False, mask=False)
+    assert load_burst(sequence).views[0].depth_m is None
+
+
+def test_instant_ngp_with_depth(tmp_path: Path, shots: list[Any], prove: Callable[..., None]) -> None:
+    folder, unit_m = tmp_path / "cup" / "blue", 4 / 65535
+    scene = INTRINSICS | {"integer_depth_scale": unit_m, "enable_depth_loading": True}
+    write(folder, shots, scene, lambda n, shot: {"depth_path": depth_png(folder, n, shot, unit_m)})
+    prove(transforms.find_sequences(folder)[0], mask=False)
+
+
+def test_nerfstudio_with_depth_masks_and_intrinsics_of_each_frame(tmp_path: Path, shots: list[Any], prove: Callable[..., None]) -> None:
+    def frame(number: int, shot: Any) -> dict[str, Any]:
+        (tmp_path / "masks").mkdir(exist_ok=True)
+        cv2.imwrite(str(tmp_path / "masks" / f"{number}.png"), shot.mask.astype(np.uint8) * 255)
+        return INTRINSICS | {"depth_file_path": depth_png(tmp_path, number, shot, 0.001), "mask_path": f"masks/{number}.png"}
+
+    write(tmp_path, shots, {"camera_model": "OPENCV"}, frame)
+    (sequence,) = transforms.find_sequences(tmp_path)
+    prove(sequence)
+    assert load_burst(sequence).views[0].mask is None
+    assert all(path.exists() for path in sequence.reader.files(sequence))
+
+
+def test_nerfstudio_can_say_its_depth_unit(tmp_path: Path, shots: list[Any], prove: Callable[..., None]) -> None:
+    scene = INTRINSICS | {"depth_unit_scale_factor": 0.0005}
+    write(tmp_path / "a", shots, scene, lambda n, shot: {"depth_file_path": depth_png(tmp_path / "a", n, shot, 0.0005)})
+    prove(transforms.find_sequences(tmp_path)[0], mask=False)
+
+
+def test_intrinsics_of_full_size_images_are_scaled(tmp_path: Path, shots: list[Any], prove: Callable[..., None]) -> None:
+    write(tmp_path, shots, {name: 2 * value for name, value in INTRINSICS.items()}, lambda n, shot: {})
+    prove(transforms.find_sequences(tmp_path)[0], depth=False, mask=False)
+
+
+def test_the_synthetic_scenes_of_nerf(tmp_path: Path, shots: list[Any]) -> None:
+    """Square pixels from the horizontal angle of view, names without suffix, transparency for a silhouette."""
+    angle = 2 * np.arctan(32 / 70)
+
+    def frame(number: int, shot: Any) -> dict[str, Any]:
+        rgba = np.dstack([shot.rgb[..., ::-1], shot.mask * 255]).astype(np.uint8)
+        cv2.imwrite(str(tmp_path / "images" / f"r_{number}.png"), rgba)
+        return {"file_path": f"./images/r_{number}"}
+
+    write(tmp_path, shots, {"camera_angle_x": angle}, frame, "transforms_train.json")
+    view = load_burst(transforms.find_sequences(tmp_path)[0], [0], masks=True).views[0]
+    assert view.camera is not None
+    np.testing.assert_allclose(view.camera.K, [[70, 0, 31.5], [0, 70, 23.5], [0, 0, 1]])
+    np.testing.assert_array_equal(view.mask, shots[0].mask)
+
+
+def test_distorted_images_are_straightened(tmp_path: Path, shots: list[Any]) -> None:
+    """A point of the ball that a distorting lens would show elsewhere is where the pinhole camera has it again."""
+    distortion = np.array([-0.3, 0.05, 0.01, -0.005])
+    K = shots[0].camera.K
+    across, down = np.meshgrid(np.arange(64.0), np.arange(48.0))
+    seen = np.stack([across.ravel(), down.ravel()], axis=-1)[:, None]
+    straight = cv2.undistortPoints(seen, K, distortion, P=K).reshape(48, 64, 2).astype(np.float32)
+    bent = [
+        type(shot)(shot.camera, cv2.remap(shot.rgb, straight[..., 0], straight[..., 1], cv2.INTER_LINEAR), shot.depth_m, shot.mask)
+        for shot in shots
+    ]
+    scene = INTRINSICS | dict(zip(("k1", "k2", "p1", "p2"), distortion.tolist()))
+    write(tmp_path, bent, scene, lambda n, shot: {})
+    for view, shot, raw in zip(load_burst(transforms.find_sequences(tmp_path)[0]).views, shots, bent, strict=True):
+        inner = cv2.erode(shot.mask.astype(np.uint8), np.ones((5, 5))) > 0
+        outer = cv2.dilate(shot.mask.astype(np.uint8), np.ones((5, 5))) == 0
+        red = view.rgb[..., 0].astype(int) - view.rgb[..., 1] > 80
+        assert red[inner].all()
+        assert not red[outer].any()
+        assert not np.array_equal(view.rgb, raw.rgb)
+
+
+@pytest.mark.parametrize(
+    ("scene", "says"),
+    [
+        ({"camera_model": "OPENCV_FISHEYE", **INTRINSICS}, "undistort the images"),
+        ({"w": 64, "h": 48}, "camera_angle_x"),
+    ],
+)
+def test_cameras_that_cannot_be_read_are_named(tmp_path: Path, shots: list[Any], scene: dict[str, Any], says: str) -> None:
+    write(tmp_path, shots, scene, lambda n, shot: {})
+    with pytest.raises(InvalidInput, match=says):
+        load_burst(transforms.find_sequences(tmp_path)[0])
+
+
+def test_what_is_missing_is_named(tmp_path: Path, shots: list[Any]) -> None:
+    with pytest.raises(InvalidInput, match=r"transforms\.json"):
+        transforms.find_sequences(tmp_path)
+    write(tmp_path / "a", shots, INTRINSICS, lambda n, shot: {"file_path": "images/lost.png"})
+    with pytest.raises(InvalidInput, match=r"frames\[0\]\.file_path"):
+        transforms.find_sequences(tmp_path / "a")
+    (tmp_path / "a" / "transforms.json").write_text("{}")
+    with pytest.raises(InvalidInput, match="frames"):
+        transforms.find_sequences(tmp_path / "a")
+    write(tmp_path / "b", shots, INTRINSICS, lambda n, shot: {"depth_path": depth_png(tmp_path / "b", n, shot, 0.001)})
+    with pytest.raises(InvalidInput, match="integer_depth_scale"):
+        load_burst(transforms.find_sequences(tmp_path / "b")[0])
