@@ -1,4 +1,4 @@
-"""`onelook simulate`, the demo, and `onelook samples`, which makes the recordings it runs on."""
+"""`onelook simulate`, the demo."""
 
 from __future__ import annotations
 
@@ -58,21 +58,6 @@ def simulate(
     write_json(record, out / "episode.json")
     console.print(summary_table(summary))
     console.print(f"\nreport: {out / 'report.html'}")
-
-
-def samples(
-    data: Annotated[Path, typer.Option(help="Folder of recorded objects to draw from.")],
-    out: Annotated[Path, typer.Option(help="New folder for the small copies.")],
-    categories: Annotated[int, typer.Option(min=1)] = 5,
-    instances: Annotated[int, typer.Option(min=1, help="Objects of each category.")] = 3,
-    views: Annotated[int, typer.Option(min=2, help="Views of each object.")] = 12,
-    seed: Annotated[int, typer.Option(help="Of the draw.")] = 0,
-) -> None:
-    """Make small copies of recorded objects, in the same layout, drawn by a seed."""
-    from clients.datasets.shrink import ShrinkConfig, shrink
-
-    names = shrink(data, out, ShrinkConfig(categories=categories, instances=instances, views=views), seed=seed)
-    console.print(f"{len(names)} objects in {out}: {', '.join(names)}")
 
 
 @contextmanager

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, TypeVar
 
 import typer
 from rich.console import Console
+from rich.progress import track
 from rich.table import Table
 
 from clients.robot import DEFAULT_URL
 
+T = TypeVar("T")
 LOG_WIDTH = 120
 """Characters a line where the output is no terminal: nothing says how wide a file is."""
 console = Console(width=None if sys.stdout.isatty() else LOG_WIDTH)
@@ -23,6 +25,11 @@ Url = Annotated[str, typer.Option(help="Address of the service.", envvar="ONELOO
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for programs.")]
 Folder = Annotated[Path, typer.Argument(help="A recorded object: rgb/, depth/, scene_camera.json, sequence.json.")]
 URL = DEFAULT_URL
+
+
+def progress_bar(items: Iterable[T], doing: str, total: int) -> Iterator[T]:
+    """The items, with a bar on a terminal's standard error: standard output stays what other programs read."""
+    yield from track(items, doing, total, console=errors, transient=True, disable=not errors.is_terminal)
 
 
 def print_json(value: object) -> None:

@@ -151,7 +151,16 @@ def _read_sequence(folder: Path) -> Sequence:
     images = tuple(sorted(path for path in (folder / "rgb").iterdir() if is_image(path)))
     listed = enumerate(about.get("symmetries") or ())
     symmetries = tuple(read_symmetry(matrix, f"{folder / ABOUT}: symmetries[{index}]") for index, matrix in listed)
-    return Sequence(folder, about["category"], about["instance"], images, _world_from_model(folder, about), symmetries)
+    longest_mm = about.get("longest_side_mm")
+    return Sequence(
+        folder,
+        about["category"],
+        about["instance"],
+        images,
+        _world_from_model(folder, about),
+        symmetries,
+        longest_side_m=longest_mm / 1000 if longest_mm else None,
+    )
 
 
 def read_symmetry(matrix: Any, field: str) -> FloatArray:

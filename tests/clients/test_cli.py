@@ -58,9 +58,17 @@ def test_the_demo_writes_its_report(url: str, samples: list[Sequence], tmp_path:
     assert json.loads((tmp_path / "demo" / "episode.json").read_text())["summary"]["objects"] == 3
 
 
+def test_photographs_become_a_folder_in_the_data_layout(samples: list[Sequence], tmp_path: Path) -> None:
+    source = f"images:{samples[0].path / 'rgb'}"
+    written = json.loads(onelook("convert", source, tmp_path / "out", "--json").output)
+    assert written == [str(tmp_path / "out" / samples[0].path.name / "rgb")]
+    assert "not empty" in onelook("convert", source, tmp_path / "out").output
+
+
 @pytest.mark.parametrize(
     ("words", "says"),
     [
+        (["convert", "kitti:nowhere", "out"], "'kitti' in 'kitti:nowhere' is none of bop, co3d"),
         (["categories", "list", "--url", "http://127.0.0.1:9"], "onelook serve"),
         (["observe", "nowhere"], "no sequence.json below nowhere"),
     ],

@@ -1,0 +1,42 @@
+"""`onelook samples` and `onelook convert`: folders of recordings from other ones."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from clients.cli.terminal import Json, console, print_json, progress_bar
+
+
+def samples(
+    data: Annotated[Path, typer.Option(help="Folder of recorded objects to draw from.")],
+    out: Annotated[Path, typer.Option(help="New folder for the small copies.")],
+    categories: Annotated[int, typer.Option(min=1)] = 5,
+    instances: Annotated[int, typer.Option(min=1, help="Objects of each category.")] = 3,
+    views: Annotated[int, typer.Option(min=2, help="Views of each object.")] = 12,
+    seed: Annotated[int, typer.Option(help="Of the draw.")] = 0,
+) -> None:
+    """Make small copies of recorded objects, in the same layout, drawn by a seed."""
+    from clients.datasets.shrink import ShrinkConfig, shrink
+
+    names = shrink(data, out, ShrinkConfig(categories=categories, instances=instances, views=views), seed=seed)
+    console.print(f"{len(names)} objects in {out}: {', '.join(names)}")
+
+
+def convert(
+    source: Annotated[str, typer.Argument(help="What to read: bop:, co3d:, transforms: or images:FOLDER.")],
+    out: Annotated[Path, typer.Argument(help="New folder for the recordings in the data layout.")],
+    json: Json = False,
+) -> None:
+    """Write recordings of another format in the data layout."""
+    from clients.datasets.convert import convert as write
+    from clients.datasets.sources import find_sequences
+
+    sequences = find_sequences(source)
+    written = list(progress_bar(write(sequences, out), "converting", len(sequences)))
+    if json:
+        print_json([str(folder) for folder in written])
+    else:
+        console.print(f"{len(written)} objects in {out}")
