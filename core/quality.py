@@ -76,7 +76,7 @@ def region_of_encoded(encoded: EncodedView) -> Region | None:
 
 
 def faults(view: View, region: Region | None) -> tuple[ViewFault, ...]:
-    """What is wrong with a view whose object is in `region`, None where it is not in the image; depth is judged only where there is some."""
+    """What is wrong with a view whose object is in `region`, None where it is not in the image; depth is judged where there is some."""
     if region is None or not view.rgb[region.inside(view.size, 0.5)].size:
         return (ViewFault("out_of_view", "the object is not in the image; aim the camera at it"),)
     found = []
