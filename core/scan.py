@@ -151,8 +151,8 @@ def coverage(request: ScanRequest, world_from_camera: Sequence[FloatArray]) -> C
     near = [nearest_view(pose, request.world_from_camera, request.center_m) for pose in world_from_camera]
     viewpoints = tuple(index if angle <= REACH_DEG else None for index, angle in near)
     taken = np.stack(world_from_camera) if len(world_from_camera) else np.empty((0, 4, 4))
-    covered = np.asarray(_angles_deg(request.world_from_camera, taken, request.center_m) <= REACH_DEG).any(axis=1)
-    return Coverage(viewpoints, tuple(angle for _, angle in near), tuple(covered.tolist()))
+    covered = np.any(_angles_deg(request.world_from_camera, taken, request.center_m) <= REACH_DEG, axis=1)
+    return Coverage(viewpoints, tuple(angle for _, angle in near), tuple(map(bool, np.atleast_1d(covered))))
 
 
 def hemisphere(center_m: FloatArray, up: FloatArray, radius_m: float, count: int) -> FloatArray:
