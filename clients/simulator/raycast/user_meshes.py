@@ -50,7 +50,7 @@ def _read(file: Path) -> Mesh:
         raise InvalidInput("meshes", f"{file} is no file")
     if file.suffix.lower() == ".ply":
         return _coloured(o3d.io.read_triangle_mesh(file), file)
-    model = o3d.io.read_triangle_model(filename=str(file))
+    model = o3d.io.read_triangle_model(str(file))  # type: ignore[arg-type,unused-ignore]  # its stub names one overload of two
     if not model.meshes:
         raise InvalidInput("meshes", f"{file} holds no mesh that Open3D can read; export it again, as triangles")
     return Mesh.join([_textured(part.mesh, model.materials[part.material_idx], file) for part in model.meshes])

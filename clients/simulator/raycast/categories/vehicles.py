@@ -117,10 +117,10 @@ def aeroplane(rng: Generator) -> list[Mesh]:
         blades = [box((0.006, 0.03, 0.15), 0.003, 8).moved((0, 0, 0.08)).turned("x", 120 * k) for k in range(3)]
         parts += [blade.moved((0.507, 0, -0.018)).painted(BLACK) for blade in blades]
         parts.append(ellipsoid((0.03, 0.022, 0.022), (0.505, 0, -0.018)).painted(accent, 0.6))
-    for at, y in ((0.36, 0.0), (0.02, 0.07), (0.02, -0.07)):
+    for place, y in ((0.36, 0.0), (0.02, 0.07), (0.02, -0.07)):
         ground = -radius - 0.075
-        parts.append(tube([(at, y, -radius * 0.5), (at, y, ground + 0.02)], 0.008).painted(pick(rng, METALS)))
-        parts.append(wheel(0.024, 0.02, METALS[0], 0.0).moved((at, y, ground + 0.024)))
+        parts.append(tube([(place, y, -radius * 0.5), (place, y, ground + 0.02)], 0.008).painted(pick(rng, METALS)))
+        parts.append(wheel(0.024, 0.02, METALS[0], 0.0).moved((place, y, ground + 0.024)))
     return parts
 
 
