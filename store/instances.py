@@ -76,6 +76,10 @@ class Instances:
         tokens = self._load({row["id"] for row in rows})
         return [Member(row["category_id"], *found) for row in rows if (found := tokens.get(row["id"])) is not None]
 
+    def reload(self) -> None:
+        """Reads all tokens anew: another backbone computed them."""
+        self._tokens = {}
+
     def _load(self, wanted: set[str]) -> dict[str, Tokens | None]:
         """Tokens by instance; what was read once stays in memory."""
         kept = {each: tokens for each, tokens in self._tokens.items() if each in wanted}

@@ -3,9 +3,9 @@
 FOLDER/
 ├── memory.sqlite3      rows, [CLS] and pooled tokens
 ├── lock                held by the process that writes here
-├── categories/ID/      reference.npz and the reference views
+├── categories/ID/      the reference's arrays and views
 ├── scans/ID/ID/        the views of each burst of a scan in progress
-└── observations/ID/    features.npz and the views
+└── observations/ID/    the arrays and views of a burst that was looked at
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
+from core.backbones.base import Backbone
 from core.errors import Conflict, NotFound, Unavailable
 from store.archive import Export, export
 from store.audit import Audit
@@ -30,6 +31,7 @@ from store.imports import Import, import_archive
 from store.instances import Instances
 from store.observations import Observations
 from store.records import AuditEntry
+from store.reembed import Features, Reembedded, reembed
 from store.requests import Requests
 from store.retention import Retention
 from store.scans import Scans
@@ -167,6 +169,18 @@ class Memory:
         backbone, Unavailable where it cannot be read or kept.
         """
         return import_archive(self._connection, path, self.categories.all(), actor=actor, progress=progress)
+
+    def reembed(self, backbone: Backbone, features: Features, *, actor: str | None = None, progress: Progress | None = None) -> Reembedded:
+        """Computes everything anew from the kept views, with another backbone or again with the same, and then ties the memory to it.
+
+        Either all of it happens or nothing does. Instances whose views are no longer kept are dropped where the backbone is another one,
+        and so are settings, which were calibrated with the first. `progress` counts categories and observations.
+
+        Raises Unavailable where a category cannot be computed.
+        """
+        result = reembed(self._connection, backbone, features, actor=actor, progress=progress)
+        self.instances.reload()
+        return result
 
     def ping(self) -> None:
         """Raises Unavailable where the database does not answer."""

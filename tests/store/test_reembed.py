@@ -1,0 +1,193 @@
+"""Another backbone computes a memory anew from the views it kept, whole or not at all."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from core.backbones.base import Backbone
+from core.encode import EncodedBurst, Encoder
+from core.errors import Conflict, Unavailable
+from core.novelty import decide
+from core.packing import burst_as_arrays
+from core.reference import build_reference
+from core.scan import look_at
+from core.sim3 import Sim3
+from core.views import Burst
+from store.memory import Memory
+from store.observations import Answer, Joins
+from store.records import Category
+
+KNOWN = Answer("known", None, None, None, None, None, None, {})
+
+
+@pytest.fixture(scope="module")
+def cup(ellipsoid: type) -> Burst:
+    """Four views of an object."""
+    thing = ellipsoid(np.array([0.05, 0.08, 0.1]))
+    up = np.array([0.0, 0, 1])
+    cameras = [look_at(0.6 * np.array([np.cos(angle), np.sin(angle), 0.6]), np.zeros(3), up) for angle in (0.0, 1.5, 3.0, 4.5)]
+    return Burst([thing.view(Sim3.identity(), camera) for camera in cameras])
+
+
+@pytest.fixture
+def other(backbone: Backbone) -> Backbone:
+    """The same with other weights."""
+
+    class Other(type(backbone)):
+        name = "hue"
+        fingerprint = "hue-1"
+
+        def __init__(self) -> None:
+            super().__init__()
+            self._waves = np.random.default_rng(7).normal(scale=1 / 25, size=self._waves.shape)
+
+    return Other()
+
+
+@pytest.fixture
+def learnt(folder: Path, backbone: Backbone, cup: Burst) -> Iterator[Memory]:
+    """A category of two bursts, the second from an observation."""
+    with Memory.open(folder) as memory:
+        memory.require_backbone(backbone.name, backbone.fingerprint)
+        encoded = Encoder(backbone).encode(cup)
+        category = memory.categories.create(build_reference(encoded), cup, encoded, name="cup")
+        joins = Joins(category.id, encoded, 0.9, "decision")
+        memory.observations.create(KNOWN, cup, burst_as_arrays(encoded), joins=joins)
+        memory.goals.create(category.id, "shelf", Sim3.identity())
+        memory.keep_setting("threshold", 0.3)
+        yield memory
+
+
+@pytest.fixture
+def category(learnt: Memory) -> Category:
+    """Its category."""
+    return learnt.categories.all()[0]
+
+
+def files(folder: Path) -> dict[str, bytes]:
+    return {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*.npz"))}
+
+
+def test_everything_is_what_the_other_backbone_makes(learnt: Memory, category: Category, other: Backbone, cup: Burst) -> None:
+    told: list[tuple[int, int]] = []
+    result = learnt.reembed(other, burst_as_arrays, actor="anna", progress=lambda done, total: told.append((done, total)))
+    assert (result.categories, result.instances, result.observations) == (1, 2, 1)
+    assert (result.dropped_instances, result.dropped_observations) == (0, 0)
+    assert told == [(1, 2), (2, 2)]
+    assert (learnt.backbone, learnt.fingerprint, learnt.setting("threshold")) == ("hue", "hue-1", None)
+    expected = Encoder(other).encode(cup)
+    for member in learnt.categories.members():
+        np.testing.assert_allclose(member.pooled, expected.pooled, atol=1e-4)
+    reference = learnt.categories.reference(category.id)
+    assert reference.fingerprint == "hue-1"
+    np.testing.assert_allclose(reference.views[0].descriptors, expected.views[0].descriptors, atol=2e-3)
+    assert decide(learnt.categories.members(), expected).outcome == "known"
+    (seen,) = learnt.observations.latest(1)
+    assert str(learnt.observations.features(seen.id)["fingerprint"]) == "hue-1"
+
+
+def test_what_people_said_stays(learnt: Memory, category: Category, other: Backbone) -> None:
+    instances = [vars(each) for each in learnt.instances.of(category.id)]
+    learnt.reembed(other, burst_as_arrays)
+    after = learnt.categories.get(category.id)
+    assert (after.name, after.created_at, after.instances) == ("cup", category.created_at, 2)
+    assert [vars(each) for each in learnt.instances.of(category.id)] == instances
+    assert [goal.name for goal in learnt.goals.of(category.id)] == ["shelf"]
+
+
+def test_it_is_whole_and_opens_with_the_other_backbone_only(learnt: Memory, other: Backbone, backbone: Backbone) -> None:
+    learnt.reembed(other, burst_as_arrays)
+    assert learnt.check().ok
+    assert len(files(learnt.folder)) == 2
+    learnt.close()
+    with Memory.open(learnt.folder) as again:
+        again.require_backbone(other.name, other.fingerprint)
+        with pytest.raises(Conflict, match="onelook memory reembed --backbone colour"):
+            again.require_backbone(backbone.name, backbone.fingerprint)
+
+
+def test_stopped_on_the_way_it_is_what_it_was(learnt: Memory, category: Category, other: Backbone, backbone: Backbone) -> None:
+    before = files(learnt.folder)
+
+    def stop(done: int, total: int) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        learnt.reembed(other, burst_as_arrays, progress=stop)
+    assert files(learnt.folder) == before
+    assert learnt.fingerprint == backbone.fingerprint
+    assert learnt.categories.reference(category.id).fingerprint == backbone.fingerprint
+
+
+def test_a_category_without_its_views_stops_it_and_is_named(learnt: Memory, category: Category, other: Backbone) -> None:
+    before = files(learnt.folder)
+    (learnt.categories.folder(category.id) / "001_rgb.png").unlink()
+    with pytest.raises(Unavailable, match="category cup cannot be computed anew.*nothing was changed"):
+        learnt.reembed(other, burst_as_arrays)
+    assert files(learnt.folder) == before
+    learnt.categories.delete(category.id)
+    assert learnt.reembed(other, burst_as_arrays).categories == 0
+
+
+def test_bursts_whose_views_are_gone_are_dropped(learnt: Memory, category: Category, other: Backbone) -> None:
+    with learnt._connection.change() as db:
+        db.execute("UPDATE instances SET pictures = NULL")
+    assert learnt.reembed(other, burst_as_arrays).dropped_instances == 2
+    (of_reference,) = learnt.instances.of(category.id)
+    assert of_reference.kept
+    assert len(learnt.categories.members()) == 1
+
+
+def test_the_same_backbone_mends_damaged_arrays(learnt: Memory, category: Category, backbone: Backbone) -> None:
+    (learnt.categories.folder(category.id) / "reference.npz").write_bytes(b"")
+    with learnt._connection.change() as db:
+        db.execute("UPDATE instances SET cls = zeroblob(4)")
+    assert len(learnt.check().damages) == 3
+    result = learnt.reembed(backbone, burst_as_arrays)
+    assert (result.instances, result.dropped_instances) == (2, 0)
+    assert learnt.check().ok
+    assert learnt.categories.reference(category.id).fingerprint == backbone.fingerprint
+    assert learnt.setting("threshold") == 0.3
+
+
+def test_what_is_in_the_bin_comes_back_with_the_other_backbone_too(learnt: Memory, category: Category, other: Backbone) -> None:
+    learnt.categories.delete(category.id)
+    entry = learnt.audit.latest(1)[0]
+    learnt.reembed(other, burst_as_arrays)
+    learnt.undo(entry.id)
+    assert learnt.categories.reference(category.id).fingerprint == "hue-1"
+    assert len(learnt.categories.members()) == 2
+
+
+def test_an_export_after_it_is_of_the_other_backbone(learnt: Memory, other: Backbone, tmp_path: Path) -> None:
+    learnt.reembed(other, burst_as_arrays)
+    with Memory.open(tmp_path / "new") as new:
+        new.import_archive(learnt.export(tmp_path / "all.zip").path)
+        assert new.fingerprint == "hue-1"
+        assert new.categories.reference(new.categories.all()[0].id).fingerprint == "hue-1"
+
+
+def test_the_views_it_read_are_untouched(learnt: Memory, category: Category, other: Backbone, cup: Burst) -> None:
+    learnt.reembed(other, burst_as_arrays)
+    assert np.array_equal(learnt.categories.view(category.id, 3).rgb, cup.views[3].rgb)
+
+
+def test_tokens_of_the_first_backbone_are_not_remembered(learnt: Memory, other: Backbone, cup: Burst, backbone: Backbone) -> None:
+    before: EncodedBurst = Encoder(backbone).encode(cup)
+    assert decide(learnt.categories.members(), before).similarities[0][1] > 0.99
+    learnt.reembed(other, burst_as_arrays)
+    assert decide(learnt.categories.members(), before).similarities[0][1] < 0.9
+
+
+def test_an_observation_that_cannot_be_computed_goes_with_its_burst(learnt: Memory, category: Category, other: Backbone) -> None:
+    (seen,) = learnt.observations.latest(1)
+    (learnt.observations.folder(seen.id) / "000_rgb.png").unlink()
+    result = learnt.reembed(other, burst_as_arrays)
+    assert (result.dropped_observations, result.dropped_instances) == (1, 1)
+    assert learnt.observations.latest(1) == []
+    assert not learnt.observations.folder(seen.id).exists()
+    assert learnt.check().ok
