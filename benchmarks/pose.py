@@ -11,72 +11,28 @@ import time
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from functools import lru_cache
-from itertools import groupby, product
+from itertools import groupby
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from benchmarks.box_iou import Parallelepiped, box_iou
+from benchmarks.contenders import Found, Setting, Sweep
 from benchmarks.encoded import encode_all, read_encoded
 from benchmarks.pairs import Pair, ViewCounts, choose_views, sample_pairs
 from benchmarks.parallel import map_jobs, worker_count
 from benchmarks.tables import print_table, write_json
 from clients.datasets import folders
 from clients.datasets.sources import find_sequences
-from clients.pose_error import NO_POSE, PoseError, accuracy, median, pose_error
+from clients.pose_error import NO_POSE, PoseError, accuracy, median, pose_error, rotation_error_deg
 from core.backbones.dino import load_backbone
 from core.boxes import remove_outliers
 from core.encode import EncodedBurst, Encoder
 from core.errors import InvalidInput, NoPose
-from core.matches import PoseEstimate
-from core.pose import PoseConfig, PoseEstimator, PoseOptions, component_count
-from core.reference import Reference, build_reference
 from core.sim3 import Sim3
 
 DEFAULT_LIMIT = 30
 """Pairs a category."""
-
-
-@dataclass(frozen=True)
-class Setting:
-    """What one group of rows has in common."""
-
-    views: ViewCounts
-    config: PoseConfig
-    dims: int
-    """Descriptor size."""
-
-
-@dataclass(frozen=True)
-class Sweep:
-    """Which settings are run: every combination. An option left out is each variant's own."""
-
-    variants: Sequence[str]
-    views: Sequence[str]
-    """As in `ViewCounts.parse`. A variant for all views there are (`ucd+`) takes them all, once."""
-    dims: Sequence[int] | None = None
-    """Descriptor sizes."""
-    methods: Sequence[str] | None = None
-    """Of `core.correspond.METHODS`."""
-    consensus_deg: Sequence[float] | None = None
-    inlier_ratios: Sequence[float] | None = None
-    estimators: Sequence[str] | None = None
-    """Of `core.estimators.named.ESTIMATORS`."""
-    dof: Sequence[int] | None = None
-    """7 or 9."""
-
-    def settings(self, token_size: int) -> list[Setting]:
-        """In the order of the table. Raises InvalidInput for a name, a count or a size that does not exist."""
-        counts = [ViewCounts.parse(text) for text in self.views]
-        axes: list[Sequence[Any] | None] = [self.dims, self.methods, self.consensus_deg, self.inlier_ratios, self.estimators, self.dof]
-        options = [PoseOptions(*each) for each in product(*(axis or [None] for axis in axes))]
-        settings = []
-        for variant in self.variants:
-            configs = [PoseConfig.named(variant, each) for each in options]
-            for count, config in product([ViewCounts.all()] if configs[0].all_views else counts, configs):
-                settings.append(Setting(count, config, component_count(config.dims, token_size) or token_size))
-        return settings
 
 
 @dataclass(frozen=True)
@@ -124,7 +80,7 @@ class PoseRow:
     """Of the box around the reference, carried by the estimate, and the target's, percent; both along the model's axes."""
     median_t_2pi: float | None
     """Median translation error where the target's longest side counts as 2π, as in CO3D (paper, "Translation estimation performance").
-    This and the next three are None where the data do not tell the longest side."""
+    This and the next three are None where the data do not tell the longest side, or there is no translation."""
     acc_t1_0: float | None
     acc_t0_5: float | None
     """Percentage of estimates whose centre is at most this far off, in the same unit."""
@@ -135,13 +91,13 @@ class PoseRow:
     """Mean size of a reference's arrays."""
     answered: float
     """Percentage that got a pose, of as many degrees of freedom as asked for."""
-    method: str
-    """How patches are matched."""
+    method: str | None
+    """How patches are matched; None, here and below, where a contender has no such setting."""
     consensus_deg: float | None
-    """None where the variant has no consensus."""
-    inlier_ratio: float
-    estimator: str
-    dof: int
+    inlier_ratio: float | None
+    estimator: str | None
+    dof: int | None
+    """5 is a rotation and a direction."""
 
 
 COLUMNS = tuple(field.name for field in fields(PoseRow))
@@ -196,21 +152,20 @@ def run(data: Path, sweep: Sweep, limit: int | None, json: Path | None, seed: in
 
 def solve(job: Job) -> JobResult:
     """Builds a job's reference and estimates the pose of each of its targets."""
-    arrays = build_reference(_select(job, job.reference, "reference", job.setting.views.reference)).as_arrays()
-    reference = Reference.from_arrays(arrays)  # as the memory keeps it
-    estimator = PoseEstimator(job.setting.config)
+    way = job.setting.contender
+    kept, memory_mb = way.learn(_select(job, job.reference, "reference", job.setting.views.reference))
     scores, solve_ms = [], []
     for sequence in job.targets:
         target = _select(job, sequence, "target", job.setting.views.target)
         started = time.perf_counter()
         try:
-            estimate = estimator.estimate(reference, target, seed=job.seed)
+            found = way.find(kept, target, job.seed)
         except NoPose:
-            estimate = None
+            found = None
         solve_ms.append(1000 * (time.perf_counter() - started))
-        scores.append(_score(estimate, reference, job, sequence))
+        scores.append(_score(found, job, sequence))
     errors, ious, dofs = zip(*scores, strict=True)
-    return JobResult(job, errors, ious, dofs, tuple(solve_ms), sum(array.nbytes for array in arrays.values()) / 1e6)
+    return JobResult(job, errors, ious, dofs, tuple(solve_ms), memory_mb)
 
 
 def table_rows(setting: Setting, results: Sequence[JobResult]) -> list[PoseRow]:
@@ -230,10 +185,11 @@ def _mean(values: Sequence[float | None]) -> float | None:
 
 def _category_row(setting: Setting, category: str, results: Sequence[JobResult]) -> PoseRow:
     errors = [error for result in results for error in result.errors]
+    options = setting.contender.options
     return PoseRow(
-        variant=setting.config.variant,
+        variant=setting.contender.variant,
         views=setting.views.text,
-        dims=setting.dims,
+        dims=setting.contender.dims,
         category=category,
         pairs=len(errors),
         acc30=accuracy(errors, 30),
@@ -246,12 +202,12 @@ def _category_row(setting: Setting, category: str, results: Sequence[JobResult])
         **_translation_figures(results),
         solve_ms=float(np.median([ms for result in results for ms in result.solve_ms])),
         memory_mb=float(np.mean([result.memory_mb for result in results])),
-        answered=100 * float(np.mean([dof == setting.config.dof for result in results for dof in result.dofs])),
-        method=setting.config.method,
-        consensus_deg=setting.config.consensus_deg,
-        inlier_ratio=setting.config.inlier_ratio,
-        estimator=setting.config.estimator,
-        dof=setting.config.dof,
+        answered=100 * float(np.mean([dof == options.dof for result in results for dof in result.dofs])),
+        method=options.method,
+        consensus_deg=options.consensus_deg,
+        inlier_ratio=options.inlier_ratio,
+        estimator=options.estimator,
+        dof=options.dof,
     )
 
 
@@ -260,7 +216,7 @@ def _translation_figures(results: Sequence[JobResult]) -> dict[str, float | None
     targets = [each for result in results for each in zip(result.job.targets, result.errors, strict=True)]
     sizes = [(sequence.world_from_model.scale if sequence.world_from_model else None, sequence.longest_side_m) for sequence, _ in targets]
     ratios = [scale / longest for scale, longest in sizes if scale and longest]
-    if len(ratios) < len(targets):
+    if len(ratios) < len(targets) or np.isnan([error.translation for _, error in targets]).any():
         return dict.fromkeys(TRANSLATION)
     distances = 2 * np.pi * np.array([error.translation for _, error in targets]) * ratios
     within = [100 * float((distances <= limit).mean()) for limit in (1.0, 0.5, 0.2)]
@@ -289,17 +245,20 @@ def _select(job: Job, sequence: folders.Sequence, role: str, count: int | None) 
 _cached = lru_cache(maxsize=16)(read_encoded)
 
 
-def _score(estimate: PoseEstimate | None, reference: Reference, job: Job, sequence: folders.Sequence) -> tuple[PoseError, float, int]:
+def _score(found: Found | None, job: Job, sequence: folders.Sequence) -> tuple[PoseError, float, int]:
     """Errors, IoU of the boxes, and degrees of freedom, against ground truth."""
     reference_from_model, target_from_model = job.reference.world_from_model, sequence.world_from_model
     assert reference_from_model, "sample_pairs requires ground truth"
     assert target_from_model, "sample_pairs requires ground truth"
-    if estimate is None:
+    if found is None:
         return NO_POSE, 0.0, 0
-    error = pose_error(estimate.target_from_reference, reference_from_model, target_from_model, sequence.symmetries)
+    if found.similarity is None or found.matrix is None:
+        off = rotation_error_deg(found.rotation, reference_from_model, target_from_model, sequence.symmetries)
+        return PoseError(off, np.nan, np.nan), np.nan, found.dof
+    error = pose_error(found.similarity, reference_from_model, target_from_model, sequence.symmetries)
     truth = _model_box(job, sequence, target_from_model)
-    found = _model_box(job, job.reference, reference_from_model).carried_by(estimate.matrix(reference.box))
-    return error, box_iou(found, truth), 7 if estimate.target_from_object is None else 9
+    carried = _model_box(job, job.reference, reference_from_model).carried_by(found.matrix)
+    return error, box_iou(carried, truth), found.dof
 
 
 def _model_box(job: Job, sequence: folders.Sequence, world_from_model: Sim3) -> Parallelepiped:

@@ -36,14 +36,20 @@ def pose_error(estimate: Sim3, reference_from_model: Sim3, target_from_model: Si
         symmetries: rotations, each (3, 3), of the target's model onto itself; the identity goes without saying.
     """
     target_from_reference = target_from_model @ reference_from_model.inverse()
-    model_rotation = target_from_model.rotation.T @ estimate.rotation @ reference_from_model.rotation
-    allowed = np.stack([np.eye(3), *symmetries])
     landed = estimate.apply(reference_from_model.translation)
     return PoseError(
-        rotation_deg=float(rotation_angle_deg(allowed, model_rotation[None]).min()),
+        rotation_deg=rotation_error_deg(estimate.rotation, reference_from_model, target_from_model, symmetries),
         translation=float(np.linalg.norm(landed - target_from_model.translation) / target_from_model.scale),
         log_scale=float(abs(np.log(estimate.scale / target_from_reference.scale))),
     )
+
+
+def rotation_error_deg(
+    rotation: FloatArray, reference_from_model: Sim3, target_from_model: Sim3, symmetries: Sequence[FloatArray] = ()
+) -> float:
+    """Of a target_from_reference rotation, shape (3, 3), alone. See `pose_error`."""
+    model_rotation = target_from_model.rotation.T @ rotation @ reference_from_model.rotation
+    return float(rotation_angle_deg(np.stack([np.eye(3), *symmetries]), model_rotation[None]).min())
 
 
 def accuracy(errors: Sequence[PoseError], threshold_deg: float) -> float:

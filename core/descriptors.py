@@ -10,6 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from core.errors import InvalidInput
+
 FloatArray = NDArray[np.float32]
 KEPT_COMPONENTS = 64
 """Components kept with a reference; the paper uses 32 and at most 32 are asked for by default."""
@@ -47,3 +49,12 @@ def unit(vectors: FloatArray) -> FloatArray:
     """Vectors scaled to length 1 along the last axis; zero stays zero."""
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
     return np.asarray(vectors / np.maximum(length, 1e-12), dtype=np.float32)
+
+
+def component_count(dims: int | None, token_size: int) -> int | None:
+    """`dims`, or None where that means whole tokens. Raises InvalidInput for more components than a reference keeps."""
+    if dims is None or dims == token_size:
+        return None
+    if dims > KEPT_COMPONENTS:
+        raise InvalidInput("dims", f"expected 1 to {KEPT_COMPONENTS}, or {token_size} for whole tokens, found {dims}")
+    return dims

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from core.correspond import PairMatches, PatchSet, match
 from core.descriptors import PcaBasis, unit
 from core.encode import EncodedBurst, EncodedView
+from core.errors import InvalidInput
 from core.matches import Matches
 from core.viewpoints import best_reference_per_target, relative_rotations
 from core.views import FloatArray
@@ -32,6 +33,21 @@ class Described(Protocol):
 
     @property
     def basis(self) -> PcaBasis: ...
+
+    @property
+    def fingerprint(self) -> str: ...
+
+
+def require_comparable(reference: Described, target: EncodedBurst) -> None:
+    """Raises InvalidInput for tokens of another backbone or a target view without a camera."""
+    if reference.fingerprint != target.fingerprint:
+        raise InvalidInput(
+            "reference",
+            f"was made with backbone {reference.fingerprint}, the burst with {target.fingerprint}; their tokens cannot be compared",
+        )
+    for index, view in enumerate(target.views):
+        if view.camera is None:
+            raise InvalidInput(f"views[{index}].K", "is missing: a pose needs K and world_from_camera for every view")
 
 
 class MatchedPair:

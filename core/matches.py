@@ -108,3 +108,10 @@ def end_points(matches: Matches, reference: Sequence[EncodedView], target: Seque
 def _gather(views: Sequence[EncodedView], view_index: NDArray[np.intp], patch: NDArray[np.intp]) -> FloatArray:
     starts = np.cumsum([0, *(len(view.points_m) for view in views)])[:-1]
     return np.concatenate([view.points_m for view in views])[starts[view_index] + patch]
+
+
+def rays(view: EncodedView, patch: NDArray[np.intp]) -> FloatArray:
+    """(x / z, y / z) of patches in the camera of their view, shape (K, 2)."""
+    assert view.camera is not None, "whoever needs rays has asked for cameras"
+    pixels = view.pixels[patch]
+    return np.ascontiguousarray(view.camera.in_camera(pixels, np.ones(len(pixels)))[:, :2])

@@ -15,13 +15,14 @@ from core.boxes import cloud_extent_m
 from core.clock import StageClock
 from core.correspond import METHODS
 from core.dense import DenseAgreement, DenseConfig
-from core.descriptors import KEPT_COMPONENTS
+from core.descriptors import component_count
 from core.encode import EncodedBurst
 from core.errors import InvalidInput, NoPose
 from core.estimators.named import ESTIMATORS
 from core.hypotheses import HypothesesConfig, distinct, propose
-from core.matched_pair import MatchedPair
+from core.matched_pair import MatchedPair, require_comparable
 from core.matches import Alternative, PoseEstimate, pool
+from core.pnp import by_pnp
 from core.reference import Reference
 from core.sim3 import Sim3
 from core.solvers import axis_scales, by_consensus, by_retrieval, by_single_view, judge, stretched
@@ -65,8 +66,9 @@ class PoseConfig:
     """Inlier threshold as a share of the target's extent."""
     estimator: str = "ransac"
     """One of `core.estimators.named.ESTIMATORS`; of the solvers that fit correspondences."""
-    solver: Literal["retrieval", "single view", "umeyama", "agreement"] = "umeyama"
-    """From view pairs to a transform: the mean of their rotations, one pair alone, the paper's RANSAC, or ours over many hypotheses."""
+    solver: Literal["retrieval", "single view", "umeyama", "agreement", "pnp"] = "umeyama"
+    """From view pairs to a transform: the mean of their rotations, one pair alone, the paper's RANSAC, ours over many hypotheses, or
+    the reference's points and the rays of target views without depth."""
     dof: int = 7
     """9 for a scale of each axis of the object's frame, fitted to what agrees with the 7-D transform."""
     all_views: bool = False
@@ -80,6 +82,8 @@ class PoseConfig:
                 raise InvalidInput(name, f"{value!r} is none of {', '.join(known)}")
         if self.dof not in (7, 9):
             raise InvalidInput("dof", f"expected 7 or 9, found {self.dof}")
+        if self.dof == 9 and self.solver == "pnp":
+            raise InvalidInput("dof", f"variant {self.variant} has no target points to fit nine degrees of freedom to; leave it at 7")
         for name, number in (("dims", self.dims), ("consensus_deg", self.consensus_deg), ("inlier_ratio", self.inlier_ratio)):
             if number is not None and not (np.isfinite(number) and number > 0):
                 raise InvalidInput(name, f"expected a positive number, found {number}")
@@ -127,10 +131,12 @@ VARIANTS = {
     "u": replace(_UCD, variant="u", dims=None, consensus_deg=None),
     "rc": replace(_UCD, variant="rc", dims=None, solver="retrieval"),
     "r": replace(_UCD, variant="r", dims=None, consensus_deg=None, solver="retrieval"),
+    "pnp": replace(_UCD, variant="pnp", consensus_deg=None, solver="pnp"),
     "zsp": replace(_UCD, variant="zsp", dims=None, consensus_deg=None, solver="single view"),
 }
 """`best` is ours; of the paper's letters (table 1), R is retrieval, U Umeyama, C consensus, D reduced descriptors, + all the views
-there are. `zsp` is what it compares with, Goodwin 2022: one reference view and the target view most similar to it."""
+there are. `pnp` is for targets without depth (its "Limitations"). `zsp` is what it compares with, Goodwin 2022: one reference view and
+the target view most similar to it."""
 
 
 class PoseEstimator:
@@ -146,8 +152,11 @@ class PoseEstimator:
         """
         clock, config = StageClock(), self.config
         require_comparable(reference, target)
+        if not (len(target.cloud_m) or config.solver == "pnp"):
+            raise InvalidInput("views", "no depth was measured on the object: this needs depth in at least one view, or the variant pnp")
         dims = component_count(config.dims, reference.basis.components.shape[1])
-        pair = MatchedPair(reference, target, dims, config.correspondences, config.method)
+        needed = (True, config.solver != "pnp")
+        pair = MatchedPair(reference, target, dims, config.correspondences, config.method, depth=needed)
         clock.lap("match")
         threshold_m = self.config.inlier_ratio * cloud_extent_m(target.cloud_m)
         estimate = self._solve(pair, threshold_m, seed, clock)
@@ -164,6 +173,8 @@ class PoseEstimator:
             return by_single_view(pair, ESTIMATORS[config.estimator], threshold_m, seed, clock)
         if config.solver == "umeyama":
             return by_consensus(pair, config.consensus_deg, ESTIMATORS[config.estimator], threshold_m, seed, clock)
+        if config.solver == "pnp":
+            return by_pnp(pair, config.inlier_ratio, seed, clock)
         return self._by_agreement(pair, threshold_m, seed, clock)
 
     def _stretch(self, estimate: PoseEstimate, pair: MatchedPair, world_from_object: Sim3, threshold_m: float, seed: int) -> PoseEstimate:
@@ -202,26 +213,3 @@ class PoseEstimator:
         alternatives = tuple(Alternative(refined[index], float(scores[index])) for index in ranked[1:])
         score = float(scores[ranked[0]])
         return PoseEstimate(transform, matches, pair.similarity, tuple(pairs), residual_m, score=score, alternatives=alternatives)
-
-
-def require_comparable(reference: Reference, target: EncodedBurst) -> None:
-    """Raises InvalidInput where descriptors, cameras or depth do not allow a 7-D pose."""
-    if reference.fingerprint != target.fingerprint:
-        raise InvalidInput(
-            "reference",
-            f"was made with backbone {reference.fingerprint}, the burst with {target.fingerprint}; their tokens cannot be compared",
-        )
-    for index, view in enumerate(target.views):
-        if view.camera is None:
-            raise InvalidInput(f"views[{index}].K", "is missing: a pose needs K and world_from_camera for every view")
-    if not len(target.cloud_m):
-        raise InvalidInput("views", "no depth was measured on the object: a 7-D pose needs depth in at least one view")
-
-
-def component_count(dims: int | None, token_size: int) -> int | None:
-    """`dims`, or None where that means whole tokens. Raises InvalidInput for more components than a reference keeps."""
-    if dims is None or dims == token_size:
-        return None
-    if dims > KEPT_COMPONENTS:
-        raise InvalidInput("dims", f"expected 1 to {KEPT_COMPONENTS}, or {token_size} for whole tokens, found {dims}")
-    return dims

@@ -35,7 +35,8 @@ def pose(
     json: JsonFile = None,
 ) -> None:
     """Accuracy of the 7-D pose between objects of a category."""
-    from benchmarks.pose import Sweep, run
+    from benchmarks.contenders import Sweep
+    from benchmarks.pose import run
 
     run(data, Sweep(variant, views, dims, method, consensus, inlier, estimator, dof), limit, json, seed, backbone)
 

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 from benchmarks import parallel, pose
+from benchmarks.contenders import Setting, Sweep, contender
 from benchmarks.pairs import ViewCounts
-from benchmarks.pose import Sweep
 from clients.datasets.folders import find_sequences
 from clients.pose_error import NO_POSE, PoseError
 from core.errors import InvalidInput, NoPose
-from core.pose import PoseConfig, PoseEstimator
+from core.pose import PoseEstimator, PoseOptions
 from core.sim3 import Sim3
 
 from .conftest import record
@@ -134,7 +134,7 @@ def test_a_refused_pose_counts_as_180(recorded: Path, tmp_path: Path, monkeypatc
 
 def test_all_is_the_mean_over_categories_not_over_pairs(recorded: Path) -> None:
     large, small = find_sequences(recorded)
-    setting = pose.Setting(ViewCounts("4", 4, 4), PoseConfig(), 32)
+    setting = Setting(ViewCounts("4", 4, 4), contender("ucd", PoseOptions(), 64))
     exact = PoseError(0.0, 0.0, 0.0)
     results = [
         pose.JobResult(pose.Job(setting, large, (small,), {}, 0), (exact,), (1.0,), (7,), (1.0,), 2.0),

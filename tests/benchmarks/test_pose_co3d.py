@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from benchmarks import parallel, pose
-from benchmarks.pose import Sweep
+from benchmarks.contenders import Sweep
 from core.scan import hemisphere
 from core.sim3 import Sim3
 
