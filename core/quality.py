@@ -65,6 +65,13 @@ def region_of_sphere(camera: Camera, center_m: FloatArray, diameter_m: float) ->
     return Region(float(pixel[0]), float(pixel[1]), float(diameter_m * max(camera.K[0, 0], camera.K[1, 1]) / depth))
 
 
+def region_of_mask(mask: NDArray[np.bool_]) -> Region:
+    """The square around a silhouette, shape (H, W), that is not empty."""
+    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    side = max(np.ptp(rows), np.ptp(columns)) + 1
+    return Region(float(columns[0] + columns[-1]) / 2, float(rows[0] + rows[-1]) / 2, float(side))
+
+
 def region_of_encoded(encoded: EncodedView) -> Region | None:
     """The square around the object that was found in a view; None where none was."""
     if not len(encoded.cells):

@@ -79,7 +79,7 @@ def request_scan(encoded: EncodedBurst, options: ScanOptions | None = None) -> S
         raise NoObject("views", "no depth was measured on the object, so viewpoints cannot be placed around it")
     center = np.median(encoded.cloud_m, axis=0).astype(float)
     extent = cloud_extent_m(encoded.cloud_m)
-    up, source = infer_up(cameras) if options.up is None else (_unit_up(options.up), "given")
+    up, source = infer_up(cameras) if options.up is None else (unit_up(options.up), "given")
     radius = standoff_m(extent, cameras) if options.standoff_m is None else options.standoff_m
     return ScanRequest(center, up, radius, hemisphere(center, up, radius, options.viewpoints), extent, source)
 
@@ -196,7 +196,8 @@ def _angles_deg(first: FloatArray, second: FloatArray, center_m: FloatArray) -> 
     return np.asarray(np.degrees(np.arccos(np.clip(left @ right.T, -1, 1))))
 
 
-def _unit_up(up: Sequence[float]) -> FloatArray:
+def unit_up(up: Sequence[float]) -> FloatArray:
+    """A direction away from the support as a unit vector, shape (3,). Raises InvalidInput where it has none."""
     length = float(np.linalg.norm(up))
     if not np.isfinite(length) or length < 1e-9:
         raise InvalidInput("up", f"expected a direction away from the support, found {list(up)}")

@@ -1,24 +1,32 @@
-"""The agent: looks, decides, asks for views and learns. No HTTP in it."""
+"""The agent: looks, decides, and says where the object is. No HTTP in it."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+
+import numpy as np
 
 from core.backbones.base import Backbone
+from core.boxes import OrientedBox
 from core.clock import StageClock
 from core.encode import EncodedBurst, Encoder
-from core.errors import InvalidInput, NoPose, TooFewViews
+from core.errors import InvalidInput, NoPose, Unavailable
+from core.evidence import evidence
 from core.matches import PoseEstimate
 from core.novelty import Decision, decide, named_score
 from core.packing import burst_from_arrays
-from core.pose import PoseConfig, PoseEstimator
-from core.reference import MIN_VIEWS, Reference, build_reference
+from core.pose import PoseConfig, PoseEstimator, PoseOptions
+from core.reference import Reference
 from core.scan import DEFAULT_VIEWPOINTS, ScanOptions, ScanRequest, request_scan
-from core.views import Burst
+from core.views import Burst, View
+from service.curation import Curation
+from service.events import Events
 from service.features import best_pair, features_as_arrays
+from service.goals import Rearranging
+from service.scanning import Scanning
 from store.memory import Memory
-from store.observations import Answer
-from store.records import Category, Observation, Pose, Scan
+from store.observations import Answer, Joins
+from store.records import Alternative, Observation, Pose
 
 
 @dataclass(frozen=True)
@@ -26,9 +34,15 @@ class AgentConfig:
     """What holds for every request that does not say otherwise."""
 
     score: str
-    threshold: float
+    threshold: float | None = None
+    """Where left out: what the memory was calibrated to, else the score's own."""
     variant: str = "ucd"
     scan_views: int = DEFAULT_VIEWPOINTS
+
+    def validate(self) -> None:
+        """Raises InvalidInput for an unknown score or variant."""
+        named_score(self.score)
+        PoseConfig.named(self.variant)
 
 
 @dataclass(frozen=True)
@@ -39,8 +53,14 @@ class ObserveOptions:
     """Takes the object for one of this category and skips the decision."""
     threshold: float | None = None
     variant: str | None = None
+    pose: PoseOptions = field(default_factory=PoseOptions)
+    """Of that variant."""
+    alternatives: int | None = None
+    """Most other transforms to be given; the variant's own number where left out."""
     learn: bool = True
     """A known object's burst joins its category; False leaves what is known as it is."""
+    up: tuple[float, float, float] | None = None
+    """For the scan of a novel object."""
     seed: int = 0
 
 
@@ -49,17 +69,28 @@ _PoseOrReason = tuple[PoseEstimate | None, Pose | None, str | None]
 
 
 class Agent:
-    """One memory and the backbone that fills it. Safe to use from several threads; calls that encode are better made one at a time."""
+    """One memory and the backbone that fills it. Safe to use from several threads."""
 
-    def __init__(self, backbone: Backbone, memory: Memory, config: AgentConfig) -> None:
+    def __init__(self, backbone: Backbone, memory: Memory, config: AgentConfig, events: Events | None = None) -> None:
         """Raises Conflict where the memory was made with another backbone, InvalidInput for an unknown score or variant."""
-        named_score(config.score)
-        PoseConfig.named(config.variant)
+        config.validate()
         memory.require_backbone(backbone.name, backbone.fingerprint)
         self.backbone = backbone
         self.memory = memory
         self.config = config
-        self._encoder = Encoder(backbone)
+        self.events = events or Events()
+        self.encoder = Encoder(backbone)
+        self.scanning = Scanning(self.encoder, memory, self.events, config.scan_views)
+        self.curation = Curation(self.encoder, memory, self.events, config.score)
+        self.rearranging = Rearranging(self.observe_known, memory, self.events)
+
+    @property
+    def threshold(self) -> float:
+        """Least similarity of a known object, where a request names none."""
+        if self.config.threshold is not None:
+            return self.config.threshold
+        calibrated = self.memory.setting(f"threshold {self.config.score}")
+        return named_score(self.config.score).threshold if calibrated is None else calibrated
 
     def observe(self, burst: Burst, options: ObserveOptions | None = None, *, frame: str | None = None) -> Observation:
         """Decides what `burst` shows; a known object gets a pose and joins its category, a novel one gets a scan. The observation is kept.
@@ -67,13 +98,13 @@ class Agent:
         Raises NotFound for an unknown category, InvalidInput for an unknown variant, NoObject where nothing is seen.
         """
         options = options or ObserveOptions()
-        estimator = PoseEstimator(PoseConfig.named(options.variant or self.config.variant))
+        estimator = PoseEstimator(self._pose_config(options))
         if options.category_id is not None:
             self.memory.categories.get(options.category_id)
         clock = StageClock()
-        encoded = self._encoder.encode(burst)
+        encoded = self.encoder.encode(burst)
         clock.lap("encode")
-        decision = None if options.category_id is not None else self._decide(encoded, options.threshold)
+        decision = None if options.category_id is not None else self.decide(encoded, options.threshold)
         clock.lap("decide")
         outcome = decision.outcome if decision else "known"
         category_id = None
@@ -82,85 +113,94 @@ class Agent:
         if outcome == "known":
             category_id = decision.similarities[0][0] if decision else options.category_id
             assert category_id is not None
-            pose = self._pose(category_id, encoded, estimator, options.seed, clock)
+            pose = self._pose(category_id, burst, encoded, estimator, options.seed, clock)
         elif outcome == "novel":
-            request, scan_error = self._scan_or_reason(encoded)
+            request, scan_error = self._scan_or_reason(encoded, options.up)
         estimate, record, pose_error = pose
-        answer = Answer(outcome, category_id, frame, decision, record, pose_error, scan_error, _timings(clock, encoded, estimate))
-        observation = self.memory.observations.create(answer, burst, features_as_arrays(encoded, estimate), request)
+        timings = _timings(clock, encoded, estimate)
+        answer = Answer(outcome, category_id, frame, decision, record, pose_error, scan_error, timings, evidence(burst, encoded))
+        joins = None
         if options.learn and category_id is not None:
-            self.memory.categories.assign(category_id, encoded, observation.id)
+            joins = Joins(category_id, encoded, decision.similarities[0][1] if decision else None, "decision" if decision else "named")
+        features = features_as_arrays(encoded, estimate)
+        observation = self.memory.observations.create(answer, burst, features, request, joins=joins)
+        self.events.publish("observation", id=observation.id, outcome=outcome, category_id=category_id, timings_ms=timings)
         return observation
+
+    def observe_known(self, burst: Burst, category_id: str, frame: str | None) -> Observation:
+        """The pose of an object that is known to be of a category; nothing is learnt."""
+        return self.observe(burst, ObserveOptions(category_id, learn=False), frame=frame)
+
+    def decide(self, encoded: EncodedBurst, threshold: float | None = None) -> Decision:
+        """What a burst is taken for."""
+        limit = self.threshold if threshold is None else threshold
+        return decide(self.memory.instances.members(), encoded, score=self.config.score, threshold=limit)
+
+    def names(self) -> dict[str, str | None]:
+        """Of all categories, by id."""
+        return {category.id: category.name for category in self.memory.categories.all()}
 
     def encoded(self, observation_id: str) -> EncodedBurst:
         """The encoded burst of an observation. Raises NotFound."""
-        observations = self.memory.observations
-        return burst_from_arrays(observations.features(observation_id))
+        return burst_from_arrays(self.memory.observations.features(observation_id))
 
-    def begin_scan(self, source: Burst | str) -> Scan:
-        """A scan of the object of a burst, or of an observation by its id.
+    def _pose_config(self, options: ObserveOptions) -> PoseConfig:
+        config = PoseConfig.named(options.variant or self.config.variant, options.pose)
+        if options.alternatives is None:
+            return config
+        return replace(config, best=replace(config.best, alternatives=options.alternatives))
 
-        Raises InvalidInput where cameras or depth are missing, NoObject, NotFound.
-        """
-        if isinstance(source, str):
-            return self.memory.scans.create(request_scan(self.encoded(source), ScanOptions(self.config.scan_views)), source)
-        return self.memory.scans.create(request_scan(self._encoder.encode(source), ScanOptions(self.config.scan_views)))
-
-    def add_views(self, scan_id: str, burst: Burst) -> Scan:
-        """Keeps views for a scan. Raises NotFound, Conflict where it is completed, InvalidInput for views without camera or depth."""
-        self.memory.scans.require_open(scan_id)
-        for index, view in enumerate(burst.views):
-            for name, value in (("K", view.camera), ("depth", view.depth_m)):
-                if value is None:
-                    raise InvalidInput(
-                        f"views[{index}].{name}", "is missing: a reference is made of views with K, world_from_camera and depth"
-                    )
-        return self.memory.scans.add(scan_id, burst)
-
-    def complete_scan(self, scan_id: str, name: str | None = None) -> Category:
-        """Makes the views of a scan a category, in one step. Raises TooFewViews, NoObject, NotFound, Conflict."""
-        scan = self.memory.scans.require_open(scan_id)
-        burst = self.memory.scans.burst(scan_id)
-        if burst is None or len(burst) < MIN_VIEWS:
-            found = f"the scan has {scan.views} of at least {MIN_VIEWS} views"
-            raise TooFewViews("views", f"{found}; send {MIN_VIEWS - scan.views} more to /v1/scans/{scan_id}/views, from other sides")
-        encoded = self._encoder.encode(burst)
-        return self.memory.categories.create(build_reference(encoded), burst, encoded, name=name, scan_id=scan_id)
-
-    def _decide(self, encoded: EncodedBurst, threshold: float | None) -> Decision:
-        limit = self.config.threshold if threshold is None else threshold
-        return decide(self.memory.categories.members(), encoded, score=self.config.score, threshold=limit)
-
-    def _pose(self, category_id: str, encoded: EncodedBurst, estimator: PoseEstimator, seed: int, clock: StageClock) -> _PoseOrReason:
-        reference = self.memory.categories.reference(category_id)
-        clock.lap("load")
+    def _pose(
+        self, category_id: str, burst: Burst, encoded: EncodedBurst, estimator: PoseEstimator, seed: int, clock: StageClock
+    ) -> _PoseOrReason:
         try:
+            reference = self.memory.categories.reference(category_id)
+            clock.lap("load")
             estimate = estimator.estimate(reference, encoded, seed=seed)
-        except (NoPose, InvalidInput) as error:
+        except (NoPose, InvalidInput, Unavailable) as error:  # one damaged category leaves the others working
             return None, None, str(error)
         finally:
             clock.lap("pose")
-        return estimate, _pose_record(estimate, reference), None
+        return estimate, _pose_record(estimate, reference, burst), None
 
-    def _scan_or_reason(self, encoded: EncodedBurst) -> tuple[ScanRequest | None, str | None]:
+    def _scan_or_reason(self, encoded: EncodedBurst, up: tuple[float, float, float] | None) -> tuple[ScanRequest | None, str | None]:
         try:
-            return request_scan(encoded, ScanOptions(self.config.scan_views)), None
+            return request_scan(encoded, ScanOptions(self.config.scan_views, up)), None
         except InvalidInput as error:
+            if error.field == "up":
+                raise
             return None, str(error)
 
 
-def _pose_record(estimate: PoseEstimate, reference: Reference) -> Pose:
+def _pose_record(estimate: PoseEstimate, reference: Reference, burst: Burst) -> Pose:
+    box = estimate.box(reference.box)
     return Pose(
         estimate.target_from_reference,
-        reference.box.moved_by(estimate.target_from_reference),
+        box,
         estimate.inliers,
         len(estimate.matches),
         best_pair(estimate.pairs, estimate.matches)[1],
         estimate.residual_m,
         estimate.score,
         estimate.confidence,
-        tuple((alternative.target_from_reference, alternative.score) for alternative in estimate.alternatives),
+        tuple(Alternative(each.target_from_reference, each.score) for each in estimate.alternatives),
+        tuple(_box_px(box, view) for view in burst.views),
+        estimate.target_from_object,
+        estimate.not_9d_because,
+        reference.symmetries,
     )
+
+
+def _box_px(box: OrientedBox, view: View) -> tuple[float, float, float, float] | None:
+    """(left, top, right, bottom) of the box's corners in an image; None where a corner is behind the camera."""
+    if view.camera is None:
+        return None
+    pixels, depths = view.camera.project(box.corners())
+    if (depths <= 0).any():
+        return None
+    height, width = view.size
+    (left, top), (right, bottom) = (np.clip(each, 0, (width - 1, height - 1)) for each in (pixels.min(axis=0), pixels.max(axis=0)))
+    return float(left), float(top), float(right), float(bottom)
 
 
 def _timings(clock: StageClock, encoded: EncodedBurst, estimate: PoseEstimate | None) -> dict[str, float]:

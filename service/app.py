@@ -11,13 +11,13 @@ from fastapi import FastAPI
 
 from core.backbones.base import Backbone
 from core.backbones.dino import load_backbone
-from core.novelty import named_score
 from service import errors, openapi
 from service.agent import Agent, AgentConfig
-from service.deps import Lane
+from service.batching import BatchingBackbone
 from service.limits import UploadLimit
-from service.routes import categories, health, observations, scans
+from service.routes import categories, goals, health, observations, scans
 from service.settings import Settings
+from service.work import WorkQueue
 from store.memory import Memory
 
 DESCRIPTION = """A growing memory of object categories for robots: look once at one object, then find and pose others of its kind.
@@ -35,7 +35,7 @@ def create_app(settings: Settings, *, backbone: Backbone | None = None) -> FastA
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         with open_agent(settings, backbone) as agent:
             app.state.agent = agent
-            app.state.lane = Lane()
+            app.state.work = WorkQueue(settings.workers, settings.queue)
             yield
 
     app = FastAPI(
@@ -49,8 +49,9 @@ def create_app(settings: Settings, *, backbone: Backbone | None = None) -> FastA
     app.add_middleware(UploadLimit, max_mb=settings.max_upload_mb)
     errors.install(app)
     openapi.install(app)
-    for module in (observations, scans, categories, health):
+    for module in (observations, scans, categories, goals, health):
         app.include_router(module.router)
+    app.state.made = observations.MADE | scans.MADE | categories.MADE | goals.MADE
     return app
 
 
@@ -60,13 +61,12 @@ def open_agent(settings: Settings, backbone: Backbone | None = None) -> Iterator
 
     Raises what `Memory.open`, `load_backbone` and `Agent` raise.
     """
-    config = agent_config(settings)
-    with Memory.open(settings.data_dir) as memory:
+    config = AgentConfig(settings.score, settings.threshold, settings.variant, settings.scan_views)
+    config.validate()
+    with Memory.open(settings.data_dir, settings.retention) as memory:
         loaded = backbone or load_backbone(settings.backbone, device=settings.device, report=log.info)
-        yield Agent(loaded, memory, config)
-
-
-def agent_config(settings: Settings) -> AgentConfig:
-    """What the agent takes from the settings. Raises InvalidInput for an unknown score."""
-    threshold = named_score(settings.score).threshold if settings.threshold is None else settings.threshold
-    return AgentConfig(settings.score, threshold, settings.variant, settings.scan_views)
+        agent = Agent(BatchingBackbone(loaded), memory, config)
+        try:
+            yield agent
+        finally:
+            agent.events.close()

@@ -1,37 +1,29 @@
-"""What routes ask for: the agent, the compute lane, and the burst in a request's body."""
+"""What routes ask for: the agent, the work queue, who asks, and the burst in a request's body."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Annotated, TypeVar
+from collections.abc import Callable, Coroutine
+from dataclasses import dataclass
+from typing import Annotated, Any
 
-import anyio
 from anyio.to_thread import run_sync
-from fastapi import Depends, Request
+from fastapi import Depends, Header, Request
+from fastapi.exceptions import RequestValidationError
+from pydantic import BaseModel, ValidationError
 from starlette.datastructures import FormData, UploadFile
 from starlette.exceptions import HTTPException
 from starlette.formparsers import MultiPartException, MultiPartParser
 
 from core.errors import InvalidInput
+from core.views import Burst
 from service.agent import Agent
 from service.decoding import Parts, Upload, decode_parts
 from service.npz import decode_npz
 from service.settings import Settings
+from service.work import WorkQueue
 
 IMAGE_PARTS = ("rgb", "depth", "mask")
 PARTS = ("burst", *IMAGE_PARTS)
-T = TypeVar("T")
-
-
-class Lane:
-    """Runs work that fills the machine, one piece at a time and off the event loop."""
-
-    def __init__(self) -> None:
-        self._limiter = anyio.CapacityLimiter(1)
-
-    async def run(self, work: Callable[[], T]) -> T:
-        """The result of `work()`."""
-        return await run_sync(work, limiter=self._limiter)
 
 
 def _agent(request: Request) -> Agent:
@@ -39,9 +31,9 @@ def _agent(request: Request) -> Agent:
     return agent
 
 
-def _lane(request: Request) -> Lane:
-    lane: Lane = request.app.state.lane
-    return lane
+def _work(request: Request) -> WorkQueue:
+    work: WorkQueue = request.app.state.work
+    return work
 
 
 def media_type(request: Request) -> str:
@@ -61,6 +53,32 @@ async def read_upload(request: Request) -> Upload:
         return await run_sync(lambda: decode_parts(parts, settings.max_views))
     found = f"is {kind}" if kind else "has no Content-Type"
     raise HTTPException(415, f"the body {found}; send multipart/form-data with the parts burst and rgb, or application/x-npz")
+
+
+@dataclass(frozen=True)
+class Source:
+    """What a request is about."""
+
+    burst_or_id: Burst | str
+    """A burst, or the id of an observation."""
+    frame: str | None
+    """Of the burst."""
+
+
+def read_source(model: type[BaseModel]) -> Callable[[Request], Coroutine[Any, Any, Source]]:
+    """A dependency: a burst in either form, or JSON of `model`, which names an observation."""
+
+    async def source(request: Request) -> Source:
+        if media_type(request) != "application/json":
+            upload = await read_upload(request)
+            return Source(upload.burst, upload.frame)
+        try:
+            named: Any = model.model_validate_json(await request.body())
+        except ValidationError as error:
+            raise RequestValidationError(error.errors()) from None
+        return Source(named.observation_id, None)
+
+    return source
 
 
 async def _read_parts(request: Request, settings: Settings) -> Parts:
@@ -99,5 +117,8 @@ async def _burst_part(form: FormData) -> str | bytes:
 
 
 AgentDep = Annotated[Agent, Depends(_agent)]
-LaneDep = Annotated[Lane, Depends(_lane)]
+WorkDep = Annotated[WorkQueue, Depends(_work)]
+ActorDep = Annotated[
+    str | None, Header(alias="X-Actor", min_length=1, max_length=200, description="Who asks; kept in the audit trail, never checked.")
+]
 UploadDep = Annotated[Upload, Depends(read_upload)]

@@ -13,6 +13,8 @@ from starlette.exceptions import HTTPException
 
 from core import errors as core
 from service.schemas.problem import MEDIA_TYPE, FieldError, Problem
+from service.work import Busy
+from store.requests import StillRunning
 
 KINDS: tuple[tuple[type[core.OneLookError], int, str, str], ...] = (
     (core.TooFewViews, 422, "too-few-views", "More views are needed"),
@@ -24,6 +26,9 @@ KINDS: tuple[tuple[type[core.OneLookError], int, str, str], ...] = (
     (core.Unavailable, 503, "unavailable", "Something the service needs is missing or busy"),
 )
 """The first kind that an error is an instance of says its status, type and title."""
+
+STILL_RUNNING_S = 1
+"""After which a request is worth repeating whose first one is still being answered."""
 
 
 def install(app: FastAPI) -> None:
@@ -45,7 +50,8 @@ def problem_of(error: core.OneLookError) -> Problem:
 
 def _on_onelook_error(request: Request, error: Exception) -> JSONResponse:
     assert isinstance(error, core.OneLookError)
-    return _answer(problem_of(error))
+    wait_s = error.retry_after_s if isinstance(error, Busy) else STILL_RUNNING_S if isinstance(error, StillRunning) else None
+    return _answer(problem_of(error), None if wait_s is None else {"Retry-After": str(wait_s)})
 
 
 def _on_validation_error(request: Request, error: Exception) -> JSONResponse:

@@ -32,6 +32,15 @@ class CategoryGallery:
             raise NotFound(f"view {index} of category {self._id!r} has no depth")
         return pictures.depth_picture(depth_m)
 
+    def mask(self, index: int) -> Picture:
+        """See `pictures.mask_picture`."""
+        return pictures.mask_picture(self._categories.view(self._id, index), self._categories.reference(self._id).views[index])
+
+    def saliency(self, index: int) -> Picture:
+        """See `pictures.saliency_picture`."""
+        self._categories.view(self._id, index)
+        return pictures.saliency_picture(self._categories.reference(self._id).views[index])
+
     def foreground(self, index: int) -> Picture:
         """See `pictures.foreground_picture`."""
         return pictures.foreground_picture(self._categories.view(self._id, index), self._categories.reference(self._id).views[index])

@@ -8,10 +8,11 @@ from fastapi import FastAPI
 from pydantic.json_schema import models_json_schema
 
 from service.schemas.bursts import BurstPart
+from service.schemas.goals import Seen
 from service.schemas.problem import Problem
 from service.schemas.scans import ScanBegin
 
-MODELS = (BurstPart, Problem, ScanBegin)
+MODELS = (BurstPart, Problem, ScanBegin, Seen)
 
 
 def install(app: FastAPI) -> None:

@@ -79,6 +79,17 @@ def foreground_picture(view: View, encoded: EncodedView) -> Picture:
     return _blend(crop, _dimmed(crop), _object_weight(encoded))
 
 
+def mask_picture(view: View, encoded: EncodedView) -> Picture:
+    """White where the view is taken for the object, black elsewhere; as fine as the patches."""
+    inside = encoded.window.paste((_object_weight(encoded) > 0.5).astype(np.float32), view.size) > 0.5
+    return np.repeat(np.where(inside, 255, 0).astype(np.uint8)[..., None], 3, axis=2)
+
+
+def saliency_picture(encoded: EncodedView) -> Picture:
+    """The soft foreground of the close crop, dark to bright."""
+    return _colour_map(np.clip(_enlarged(encoded.saliency.astype(np.float32), cv2.INTER_CUBIC), 0, 1))
+
+
 def pca_picture(view: View, encoded: EncodedView, colours: ComponentColours) -> Picture:
     """The object's patches coloured by their principal components, over the dimmed close crop."""
     grid = np.zeros((encoded.grid, encoded.grid, 3), dtype=np.float32)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from datetime import timedelta
 from pathlib import Path
 
 from platformdirs import user_data_path
@@ -10,6 +11,7 @@ from pydantic_settings import BaseSettings, SettingsConfigDict
 
 from core.backbones.dino import EMBEDDED
 from core.novelty import DEFAULT_SCORE
+from store.retention import Retention
 
 
 class Settings(BaseSettings):
@@ -30,5 +32,15 @@ class Settings(BaseSettings):
     threshold: float | None = Field(None, description="Least similarity of a known object; the score's own default where left out.")
     variant: str = Field("best", description="Variant of the pose pipeline.")
     max_upload_mb: int = Field(128, gt=0, description="Largest request body, in megabytes of 1 000 000 bytes.")
+    workers: int = Field(2, gt=0, description="Requests that are worked on at once; those that come together share passes of the backbone.")
+    queue: int = Field(16, ge=0, description="Requests that may wait; more are answered 503 with Retry-After.")
     max_views: int = Field(32, gt=0, description="Most views in one burst.")
     scan_views: int = Field(10, ge=2, le=64, description="Viewpoints that a scan asks for.")
+    scan_expiry_h: float = Field(24, gt=0, description="Hours after which a scan expires that no views come for.")
+    keep_observations: int = Field(1000, gt=0, description="Observations kept, with their views; the oldest are dropped.")
+    undo_days: float = Field(30, ge=0, description="Days for which a rename, merge, split or deletion can be undone.")
+
+    @property
+    def retention(self) -> Retention:
+        """How much the memory keeps, and how long."""
+        return Retention(self.keep_observations, timedelta(days=self.undo_days), timedelta(hours=self.scan_expiry_h))

@@ -6,17 +6,23 @@ Letters: n requested viewpoints.
 from __future__ import annotations
 
 import json
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from core.affine9 import Affine9
 from core.boxes import OrientedBox
+from core.evidence import Evidence
 from core.novelty import Decision
+from core.quality import ViewFault
 from core.scan import ScanRequest
 from core.sim3 import Sim3
 from store.folders import Files, FileSum
-from store.records import Pose
+from store.records import Alternative, Pose
+
+AFFINE9 = ("scales", "rotation", "translation")
 
 
 def files_to_json(files: Files) -> str:
@@ -85,7 +91,11 @@ def pose_to_json(pose: Pose) -> str:
             "residual_m": pose.residual_m,
             "score": pose.score,
             "confidence": pose.confidence,
-            "alternatives": [[_sim3(transform), score] for transform, score in pose.alternatives],
+            "alternatives": [[_sim3(each.target_from_reference), each.score, each.confidence] for each in pose.alternatives],
+            "boxes_px": pose.boxes_px,
+            "target_from_object": _affine9(pose.target_from_object) if pose.target_from_object else None,
+            "not_9d_because": pose.not_9d_because,
+            "symmetries": pose.symmetries.tolist(),
         }
     )
 
@@ -94,7 +104,8 @@ def pose_from_json(text: str) -> Pose:
     """The inverse of `pose_to_json`."""
     fields = json.loads(text)
     box = OrientedBox(np.array(fields["box"]["world_from_object"]), np.array(fields["box"]["extent_m"]))
-    alternatives = tuple((_as_sim3(transform), score) for transform, score in fields["alternatives"])
+    alternatives = tuple(Alternative(_as_sim3(transform), *judged) for transform, *judged in fields["alternatives"])
+    stretched = fields.get("target_from_object")
     return Pose(
         _as_sim3(fields["target_from_reference"]),
         box,
@@ -105,7 +116,27 @@ def pose_from_json(text: str) -> Pose:
         fields["score"],
         fields["confidence"],
         alternatives,
+        tuple(each and tuple(each) for each in fields.get("boxes_px", ())),
+        Affine9(*(np.array(stretched[name]) for name in AFFINE9)) if stretched else None,
+        fields.get("not_9d_because"),
+        np.array(fields.get("symmetries", ())).reshape(-1, 3, 3),
     )
+
+
+def evidence_to_json(evidence: Evidence) -> str:
+    """One TEXT column."""
+    return json.dumps(asdict(evidence))
+
+
+def evidence_from_json(text: str) -> Evidence:
+    """The inverse of `evidence_to_json`."""
+    fields = json.loads(text)
+    faults = tuple(tuple(ViewFault(**fault) for fault in view) for view in fields.pop("faults"))
+    return Evidence(**fields, faults=faults)
+
+
+def _affine9(transform: Affine9) -> dict[str, Any]:
+    return {name: np.asarray(getattr(transform, name)).tolist() for name in AFFINE9}
 
 
 def _sim3(transform: Sim3) -> dict[str, Any]:

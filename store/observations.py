@@ -11,12 +11,22 @@ from sqlite_utils import Database
 
 from core.encode import EncodedBurst
 from core.errors import NotFound
+from core.evidence import Evidence
 from core.novelty import Decision
 from core.scan import ScanRequest
 from core.views import Burst, View
 from store.arrays import Array, arrays_file, read_arrays, write_arrays
 from store.bursts import read_view, write_burst
-from store.columns import decision_from_json, decision_to_json, files_from_json, files_to_json, pose_from_json, pose_to_json
+from store.columns import (
+    decision_from_json,
+    decision_to_json,
+    evidence_from_json,
+    evidence_to_json,
+    files_from_json,
+    files_to_json,
+    pose_from_json,
+    pose_to_json,
+)
 from store.connection import Connection, Row, new_id, only
 from store.folders import Files
 from store.instances import insert_instance
@@ -43,6 +53,7 @@ class Answer:
     pose_error: str | None
     scan_error: str | None
     timings_ms: Mapping[str, float]
+    evidence: Evidence | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,6 +186,7 @@ def _row(observation_id: str, answer: Answer, views: int, files: Files) -> Row:
         "timings_ms": json.dumps(dict(answer.timings_ms)),
         "features_sha256": arrays_file(files)[1].sha256,
         "files": files_to_json(files),
+        "evidence": evidence_to_json(answer.evidence) if answer.evidence else None,
     }
 
 
@@ -193,4 +205,5 @@ def _observation(row: Row) -> Observation:
         row["scan_error"],
         json.loads(row["timings_ms"]),
         row["features_sha256"],
+        evidence_from_json(row["evidence"]) if row["evidence"] else None,
     )

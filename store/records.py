@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
+import numpy as np
+
+from core.affine9 import Affine9
 from core.boxes import OrientedBox
+from core.evidence import Evidence
 from core.novelty import Decision
 from core.scan import ScanRequest
 from core.sim3 import Sim3
+from core.views import FloatArray
 
 Outcome = Literal["known", "uncertain", "novel"]
 ScanState = Literal["requested", "collecting", "completed", "expired"]
@@ -117,6 +122,15 @@ class Scan:
 
 
 @dataclass(frozen=True, eq=False)
+class Alternative:
+    """Another transform that was considered for an object."""
+
+    target_from_reference: Sim3
+    score: float
+    confidence: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
 class Pose:
     """Where the object of a burst is, measured from the reference of its category."""
 
@@ -131,8 +145,15 @@ class Pose:
     score: float | None
     """Agreement of both objects' points, where the variant computes it; of the same kind as the alternatives' scores."""
     confidence: float | None
-    alternatives: tuple[tuple[Sim3, float], ...]
-    """Other transforms considered, best first, with their scores."""
+    alternatives: tuple[Alternative, ...]
+    """Best first."""
+    boxes_px: tuple[tuple[float, float, float, float] | None, ...] = ()
+    """Of each view the (left, top, right, bottom) of the box's corners within the image; None where one is behind the camera."""
+    target_from_object: Affine9 | None = None
+    """Where 9-D was asked for: a scale of its own for each axis of the box."""
+    not_9d_because: str | None = None
+    symmetries: FloatArray = field(default_factory=lambda: np.empty((0, 3, 3)))
+    """The reference's, about its box's centre: turned by any of them, the pose means the same. Shape (S, 3, 3)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,3 +178,5 @@ class Observation:
     """Why a novel object has no scan."""
     timings_ms: dict[str, float]
     features_sha256: str
+    evidence: Evidence | None
+    """How much the answer rests on; None where an earlier version did not record it."""

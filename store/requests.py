@@ -16,6 +16,10 @@ from store.connection import Connection, only, running_request
 from store.retention import ago, now
 
 
+class StillRunning(Conflict):
+    """The first request with a key is not answered yet."""
+
+
 @dataclass(frozen=True)
 class Reply:
     """An answer, as it went out."""
@@ -55,12 +59,12 @@ class Requests:
     def once(self, key: str, route: str, digest: str) -> Iterator[Once]:
         """What is done inside counts as done for `key` on `route`; `digest` is the body's.
 
-        Raises Conflict where the key came with another body, or its first request still runs.
+        Raises Conflict where the key came with another body, StillRunning where its first request is not answered yet.
         """
         request = (key, route)
         with self._lock:
             if request in self._running:
-                raise Conflict(f"the request with Idempotency-Key {key!r} is still being answered; repeat it later")
+                raise StillRunning(f"the request with Idempotency-Key {key!r} is still being answered; repeat it later")
             earlier = self._begin(key, route, digest)
             if earlier is None:
                 self._running.add(request)

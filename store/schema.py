@@ -176,5 +176,11 @@ def m002_years(db: Database) -> None:
         db.table(table).create_index([column])
 
 
+@migrations()
+def m003_evidence(db: Database) -> None:
+    """How much each observation's answer rests on."""
+    db.table("observations").add_column("evidence", str)
+
+
 def _reference(table: str, column: str, other_table: str, on_delete: str) -> ForeignKey:
     return ForeignKey(table, column, other_table, "id", on_delete=on_delete)

@@ -34,7 +34,7 @@ def info(agent: AgentDep) -> Info:
         backbone=agent.backbone.name,
         fingerprint=agent.backbone.fingerprint,
         score=agent.config.score,
-        threshold=agent.config.threshold,
+        threshold=agent.threshold,
         variant=agent.config.variant,
         categories=len(agent.memory.categories.all()),
         memory_version=agent.memory.version,

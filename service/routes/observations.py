@@ -2,48 +2,56 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 from fastapi import APIRouter, Query, Response
 
 from core.errors import InvalidInput
 from core.views import Burst
-from service.agent import Agent, ObserveOptions
-from service.deps import AgentDep, LaneDep, UploadDep
+from service.agent import Agent
+from service.deps import AgentDep, UploadDep, WorkDep
+from service.exchange import MemoryRoute
 from service.features import pose_details_from_arrays
 from service.gallery import ObservationGallery
 from service.routes.png import PNG_RESPONSES, png
 from service.routes.scans import scan_answer
 from service.schemas.bursts import BURST_BODY
-from service.schemas.observations import Debug, Observation, ObservationList, ObserveQuery
+from service.schemas.observations import AnswerQuery, Debug, NewObservationQuery, Observation, ObservationList
 from service.schemas.problem import problems
+from service.schemas.vision_msgs import Detection3DArray
 from store import records
 
-router = APIRouter(prefix="/v1/observations", tags=["observations"])
+router = APIRouter(prefix="/v1/observations", tags=["observations"], route_class=MemoryRoute)
 
-Include = Annotated[list[Literal["debug"]], Query(description="`debug` adds what the pose was computed from.")]
 ViewIndex = Annotated[int, Query(ge=0, description="Which of the burst's views, from 0.")]
+Answer = Observation | Detection3DArray
 
 
 @router.post("", status_code=201, responses=problems(404, 413, 415, 422, 503), openapi_extra={"requestBody": BURST_BODY})
-async def observe(upload: UploadDep, query: Annotated[ObserveQuery, Query()], agent: AgentDep, lane: LaneDep) -> Observation:
+async def observe(upload: UploadDep, query: Annotated[NewObservationQuery, Query()], agent: AgentDep, work: WorkDep) -> Answer:
     """Decides what a burst shows: a known object is answered with its pose and joins its category, a novel one with a scan to carry out."""
     burst = _first_views(upload.burst, query.views_used)
-    options = ObserveOptions(query.category_id, query.threshold, query.variant, query.learn, query.seed)
-    debug = "debug" in query.include
-    return await lane.run(lambda: _answer(agent, agent.observe(burst, options, frame=upload.frame), debug=debug))
+    options = query.options()
+    return await work.run(lambda: _answer(agent, agent.observe(burst, options, frame=upload.frame), query))
 
 
-@router.get("", responses=problems(422))
-def list_observations(agent: AgentDep, limit: Annotated[int, Query(ge=1, le=1000, description="Most to list.")] = 50) -> ObservationList:
+@router.get("", responses=problems(404, 422))
+def list_observations(
+    agent: AgentDep,
+    limit: Annotated[int, Query(ge=1, le=1000, description="Most to list.")] = 50,
+    before: Annotated[str | None, Query(description="Only those older than this observation: the last one of the page before.")] = None,
+    category_id: Annotated[str | None, Query(description="Only those recognised as this category.")] = None,
+    outcome: Annotated[records.Outcome | None, Query(description="Only those decided so.")] = None,
+) -> ObservationList:
     """The latest observations, newest first."""
-    return ObservationList(observations=[_answer(agent, seen) for seen in agent.memory.observations.latest(limit)])
+    found = agent.memory.observations.latest(limit, before=before, category_id=category_id, outcome=outcome)
+    return ObservationList(observations=[_observation(agent, seen) for seen in found])
 
 
 @router.get("/{observation_id}", responses=problems(404, 422))
-def get_observation(observation_id: str, agent: AgentDep, include: Include = []) -> Observation:  # noqa: B006 - FastAPI copies defaults
+def get_observation(observation_id: str, query: Annotated[AnswerQuery, Query()], agent: AgentDep) -> Answer:
     """What was answered then."""
-    return _answer(agent, agent.memory.observations.get(observation_id), debug="debug" in include)
+    return _answer(agent, agent.memory.observations.get(observation_id), query)
 
 
 @router.get("/{observation_id}/rgb.png", response_class=Response, responses=PNG_RESPONSES)
@@ -88,10 +96,24 @@ def _first_views(burst: Burst, count: int | None) -> Burst:
     return burst.select(range(count))
 
 
-def _answer(agent: Agent, seen: records.Observation, *, debug: bool = False) -> Observation:
-    names = {category.id: category.name for category in agent.memory.categories.all()}
-    scan = scan_answer(agent.memory.scans.get(seen.scan_id)) if seen.scan_id else None
-    return Observation.of(seen, names, scan, _debug(agent, seen.id) if debug else None)
+def observation(agent: Agent, observation_id: str) -> Observation:
+    """As JSON."""
+    return _observation(agent, agent.memory.observations.get(observation_id))
+
+
+MADE = {"/v1/observations": observation}
+"""What a repeated request is answered with where its first answer was lost."""
+
+
+def _answer(agent: Agent, seen: records.Observation, query: AnswerQuery) -> Answer:
+    if query.format == "vision_msgs":
+        return Detection3DArray.of(seen, agent.names())
+    return _observation(agent, seen, debug="debug" in query.include)
+
+
+def _observation(agent: Agent, seen: records.Observation, *, debug: bool = False) -> Observation:
+    scan = scan_answer(agent, agent.memory.scans.get(seen.scan_id)) if seen.scan_id else None
+    return Observation.of(seen, agent.names(), scan, _debug(agent, seen.id) if debug else None)
 
 
 def _debug(agent: Agent, observation_id: str) -> Debug | None:

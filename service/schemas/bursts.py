@@ -103,3 +103,9 @@ NPZ: dict[str, Any] = {
 }
 BURST_BODY: dict[str, Any] = {"required": True, "content": {"multipart/form-data": MULTIPART, "application/x-npz": NPZ}}
 """The `requestBody` of a route that takes a burst."""
+
+
+def burst_or(model: str) -> dict[str, Any]:
+    """The `requestBody` of a route that takes a burst, or JSON of a model that names an earlier observation."""
+    content = BURST_BODY["content"] | {"application/json": {"schema": {"$ref": f"#/components/schemas/{model}"}}}
+    return {"required": True, "content": content}

@@ -6,13 +6,21 @@ Letters: M reference views, N views of the burst.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
+from core.pose import PoseOptions
+from core.sim3 import Sim3
+from core.views import FloatArray
+from service.agent import ObserveOptions
 from service.schemas import scans
-from service.schemas.geometry import Box, Matrix4, Similarity
+from service.schemas.geometry import Box, Direction, Matrix4, Quaternion, Similarity, Stretch, as_up
+from service.schemas.quality import Evidence
 from store import records
+
+PixelBox = Annotated[list[float], Field(min_length=4, max_length=4)]
 
 
 class ObserveQuery(BaseModel):
@@ -27,9 +35,42 @@ class ObserveQuery(BaseModel):
         True,
         description="A known object's burst joins its category, for later decisions; false leaves what is known as it is.",
     )
+    up: Direction | None = Field(
+        None, description="For the scan of a novel object: away from the support, `up=0&up=0&up=1`; told from the cameras where left out."
+    )
+    alternatives: int | None = Field(None, ge=0, le=10, description="Most other transforms to be given; of variant `best`.")
     variant: str | None = Field(None, description="Variant of the pose pipeline, for this request.")
+    dof: Literal[7, 9] | None = Field(None, description="9 gives each axis of the object a scale of its own; 7 where left out.")
+    dims: int | None = Field(None, ge=1, le=4096, description="Principal components of a descriptor that are compared.")
+    method: str | None = Field(None, description="How correspondences are found.")
+    consensus_deg: float | None = Field(None, gt=0, le=180, description="Angle within which view pairs agree, of variants with consensus.")
+    inlier_ratio: float | None = Field(None, gt=0, le=1, description="Inlier threshold as a share of the object's diameter.")
+    estimator: str | None = Field(None, description="What fits a transform to correspondences, of variants that do.")
     seed: int = Field(0, ge=0, lt=2**31, description="Of the random choices in the pose pipeline; the same seed gives the same pose.")
-    include: list[Literal["debug"]] = Field([], description="`debug` adds what the pose was computed from.", examples=[["debug"]])
+
+    def options(self) -> ObserveOptions:
+        """As the agent has them."""
+        pose = PoseOptions(self.dims, self.method, self.consensus_deg, self.inlier_ratio, self.estimator, self.dof)
+        return ObserveOptions(
+            self.category_id, self.threshold, self.variant, pose, self.alternatives, self.learn, as_up(self.up), self.seed
+        )
+
+
+class AnswerQuery(BaseModel):
+    """How an observation is answered."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    include: list[Literal["debug"]] = Field(
+        [], max_length=1, description="`debug` adds what the pose was computed from.", examples=[["debug"]]
+    )
+    format: Literal["onelook", "vision_msgs"] = Field(
+        "onelook", description="`vision_msgs` answers in the shape of ROS 2 vision_msgs/msg/Detection3DArray instead."
+    )
+
+
+class NewObservationQuery(ObserveQuery, AnswerQuery):
+    """Both."""
 
 
 class CategorySimilarity(BaseModel):
@@ -45,6 +86,7 @@ class Alternative(BaseModel):
 
     target_from_reference: Similarity
     score: float = Field(description="Larger is better; to be compared with the pose's `score`.")
+    confidence: float | None = Field(description="As the pose's.")
 
 
 class Pose(BaseModel):
@@ -53,10 +95,21 @@ class Pose(BaseModel):
     target_from_reference: Similarity = Field(
         description="From the world frame of the category's reference scan to the world frame of this burst, metres both."
     )
+    target_from_object: Stretch | None = Field(
+        description="With dof=9: from the reference's object frame to the world frame of this burst, a scale for each axis."
+    )
+    not_9d_because: str | None = Field(description="Why there is none though it was asked for.")
+    frame: str | None = Field(description="Name of the burst's world frame, which everything here is in.", examples=["map"])
     world_from_object: Matrix4 = Field(
         description="Rigid: the object frame (centre and axes of its box) in the burst's world frame, metres."
     )
     box: Box
+    boxes_px: list[PixelBox | None] = Field(
+        description="Of each view [left, top, right, bottom] around the box's corners, pixels; null where a corner is behind the camera."
+    )
+    symmetries: list[Quaternion] = Field(
+        description="Rotations about the object frame's origin, (w, x, y, z) in that frame: turned by any of them, the pose means the same."
+    )
     inliers: int = Field(description="Correspondences that agree with the transform.", examples=[118])
     correspondences: int = Field(description="Correspondences it was fitted to.", examples=[250])
     best_view: int = Field(description="Which of the burst's views has the most inliers, from 0; its pictures tell most.", examples=[2])
@@ -66,12 +119,17 @@ class Pose(BaseModel):
     alternatives: list[Alternative] = Field(description="Other transforms that were considered, best first.")
 
     @staticmethod
-    def of(pose: records.Pose) -> Pose:
+    def of(pose: records.Pose, frame: str | None) -> Pose:
         """From the memory's record."""
         return Pose(
             target_from_reference=Similarity.of(pose.target_from_reference),
+            target_from_object=Stretch.of(pose.target_from_object) if pose.target_from_object else None,
+            not_9d_because=pose.not_9d_because,
+            frame=frame,
             world_from_object=pose.box.world_from_object.tolist(),
             box=Box.of(pose.box),
+            boxes_px=[list(box) if box else None for box in pose.boxes_px],
+            symmetries=[_in_object_frame(turn, pose) for turn in pose.symmetries],
             inliers=pose.inliers,
             correspondences=pose.correspondences,
             best_view=pose.best_view,
@@ -79,9 +137,18 @@ class Pose(BaseModel):
             score=pose.score,
             confidence=pose.confidence,
             alternatives=[
-                Alternative(target_from_reference=Similarity.of(transform), score=score) for transform, score in pose.alternatives
+                Alternative(target_from_reference=Similarity.of(each.target_from_reference), score=each.score, confidence=each.confidence)
+                for each in pose.alternatives
             ],
         )
+
+
+def _in_object_frame(turn: FloatArray, pose: records.Pose) -> list[float]:
+    """A rotation of the reference's world, shape (3, 3), as a quaternion of the object frame."""
+    reference_from_object = pose.target_from_reference.rotation.T @ pose.box.world_from_object[:3, :3]
+    rotation = reference_from_object.T @ turn @ reference_from_object
+    quaternion: list[float] = Sim3(1.0, rotation, np.zeros(3)).quaternion.tolist()
+    return quaternion
 
 
 class Debug(BaseModel):
@@ -110,6 +177,7 @@ class Observation(BaseModel):
     pose_error: str | None = Field(description="Why a known object has no pose.")
     scan: scans.Scan | None = Field(description="Of a novel object: the views to take so that it becomes a category.")
     scan_error: str | None = Field(description="Why a novel object has no scan.")
+    evidence: Evidence | None = Field(description="How much the answer rests on; null where an earlier version did not record it.")
     timings_ms: dict[str, float] = Field(description="Milliseconds of each stage, and their `total`.")
     debug: Debug | None = Field(None, description="Where `include=debug` asked for it.")
 
@@ -134,10 +202,11 @@ class Observation(BaseModel):
             score=decision.score if decision else None,
             threshold=decision.threshold if decision else None,
             similarities=[CategorySimilarity(**each) for each in similarities],
-            pose=Pose.of(observation.pose) if observation.pose else None,
+            pose=Pose.of(observation.pose, observation.frame) if observation.pose else None,
             pose_error=observation.pose_error,
             scan=scan,
             scan_error=observation.scan_error,
+            evidence=Evidence.of(observation.evidence) if observation.evidence else None,
             timings_ms=observation.timings_ms,
             debug=debug,
         )

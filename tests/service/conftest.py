@@ -27,11 +27,12 @@ COLOURS = {"bright": (190, 60), "dark": (80, 40)}
 
 @pytest.fixture(scope="session")
 def look(ellipsoid: Any) -> Callable[..., Burst]:
-    """look(kind, views=…, world_from_object=…): a burst around an object."""
+    """look(kind, views=…, world_from_object=…, poses=…): a burst around an object, or from these camera poses."""
 
-    def burst(kind: str = "bright", views: int = 6, world_from_object: Sim3 | None = None) -> Burst:
+    def burst(kind: str = "bright", views: int = 6, world_from_object: Sim3 | None = None, poses: Any = None) -> Burst:
         placed = world_from_object or Sim3.identity()
-        poses = hemisphere(placed.translation, np.array([0.0, 0.0, 1.0]), 0.5 * placed.scale, views)
+        if poses is None:
+            poses = hemisphere(placed.translation, np.array([0.0, 0.0, 1.0]), 0.5 * placed.scale, views)
         shown = ellipsoid(HALF_AXES_M, COLOURS[kind])
         return Burst([shown.view(placed, pose) for pose in poses])
 
@@ -85,7 +86,7 @@ def npz() -> Callable[..., bytes]:
 @pytest.fixture
 def settings(tmp_path: Path) -> Settings:
     """Settings of a small service in a temporary folder."""
-    return Settings(data_dir=tmp_path / "memory", max_views=12, max_upload_mb=8)
+    return Settings(data_dir=tmp_path / "memory", max_views=12, max_upload_mb=8, variant="ucd")
 
 
 @pytest.fixture

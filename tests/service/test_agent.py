@@ -24,8 +24,8 @@ def agent(tmp_path, backbone):
 def test_look_scan_know(agent, look):
     seen = agent.observe(look())
     assert (seen.outcome, seen.pose) == ("novel", None)
-    agent.add_views(seen.scan_id, look())
-    category = agent.complete_scan(seen.scan_id, "ball")
+    agent.scanning.add(seen.scan_id, look())
+    category = agent.scanning.complete(seen.scan_id, "ball")
     again = agent.observe(look())
     assert (again.outcome, again.category_id) == ("known", category.id)
     assert np.allclose(again.pose.target_from_reference.as_matrix(), np.eye(4), atol=0.01)
@@ -35,9 +35,9 @@ def test_an_answer_is_the_same_after_reopening(tmp_path, backbone, look):
     asked = look("bright", views=3), ObserveOptions(learn=False)
     with Memory.open(tmp_path / "memory") as memory:
         agent = Agent(backbone, memory, CONFIG)
-        scan = agent.begin_scan(look())
-        agent.add_views(scan.id, look())
-        agent.complete_scan(scan.id)
+        scan = agent.scanning.begin(look())
+        agent.scanning.add(scan.id, look())
+        agent.scanning.complete(scan.id)
         before = agent.observe(*asked)
     with Memory.open(tmp_path / "memory") as memory:
         after = Agent(backbone, memory, CONFIG).observe(*asked)
@@ -48,7 +48,7 @@ def test_an_answer_is_the_same_after_reopening(tmp_path, backbone, look):
 def test_an_observation_s_tokens_are_kept_for_a_later_scan(agent, look):
     seen = agent.observe(look())
     kept = agent.encoded(seen.id)
-    fresh = agent._encoder.encode(look())
+    fresh = agent.encoder.encode(look())
     assert np.allclose(kept.views[3].descriptors, fresh.views[3].descriptors, atol=1e-3)
     assert np.array_equal(kept.cloud_m, fresh.cloud_m)
 
@@ -60,20 +60,20 @@ def test_an_unknown_variant_is_refused_before_anything_is_computed(agent, look):
 
 
 def test_one_view_makes_no_category(agent, look):
-    scan = agent.begin_scan(look())
-    agent.add_views(scan.id, look().select([0]))
+    scan = agent.scanning.begin(look())
+    agent.scanning.add(scan.id, look().select([0]))
     with pytest.raises(TooFewViews, match="send 1 more"):
-        agent.complete_scan(scan.id)
+        agent.scanning.complete(scan.id)
 
 
 def test_two_that_complete_one_scan_at_once_make_one_category(agent, look):
-    scan = agent.begin_scan(look())
-    agent.add_views(scan.id, look())
+    scan = agent.scanning.begin(look())
+    agent.scanning.add(scan.id, look())
     outcomes = []
 
     def complete():
         try:
-            outcomes.append(agent.complete_scan(scan.id).id)
+            outcomes.append(agent.scanning.complete(scan.id).id)
         except Conflict:
             outcomes.append("conflict")
 

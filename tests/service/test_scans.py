@@ -57,11 +57,8 @@ def test_completing_makes_a_category(client, scan, look, parts):
     assert answer.status_code == 201
     category = answer.json()
     assert (category["name"], category["views"], category["instances"]) == ("ball", 6, 1)
-    assert client.get(f"/v1/scans/{scan['id']}").json() | {"world_from_camera": []} == scan | {
-        "state": "completed",
-        "category_id": category["id"],
-        "world_from_camera": [],
-    }
+    done = client.get(f"/v1/scans/{scan['id']}").json()
+    assert (done["state"], done["category_id"], done["views"], done["received"]) == ("completed", category["id"], 0, [])
 
 
 def test_a_completed_scan_is_closed(client, scan, look, parts):
@@ -115,3 +112,72 @@ def test_a_scan_survives_a_restart(settings, backbone, look, parts):
     with TestClient(create_app(settings, backbone=backbone)) as client:
         assert add(client, scan, parts, look().select([3, 4, 5])).json()["views"] == 6
         assert client.post(f"/v1/scans/{scan['id']}/complete").json()["views"] == 6
+
+
+def test_each_accepted_view_says_which_viewpoint_it_covers(client, scan, look, parts):
+    for index in (0, 3):
+        scan = add(client, scan, parts, look(poses=[np.array(scan["world_from_camera"][index])])).json()
+    assert [view["viewpoint"] for view in scan["received"]] == [0, 3]
+    assert all(view["angle_deg"] < 1 for view in scan["received"])
+    assert [index for index, covered in enumerate(scan["covered"]) if covered] == [0, 3]
+    assert scan["coverage"] == pytest.approx(0.2)
+
+
+def test_a_bad_view_is_accepted_with_its_faults(client, scan, look, parts):
+    aside = np.array(scan["world_from_camera"][0])
+    aside[:3, 3] += 0.22 * aside[:3, 0]
+    answer = add(client, scan, parts, look(poses=[aside]))
+    assert answer.status_code == 200
+    (view,) = answer.json()["received"]
+    assert "cut_off" in [fault["kind"] for fault in view["faults"]]
+    assert all(fault["detail"] for fault in view["faults"])
+
+
+def test_options_of_a_scan(client, look, parts):
+    options = {"viewpoints": 20, "up": [0, 0, 2], "standoff_m": 0.9}
+    scan = client.post("/v1/scans", files=parts(look()), params=options).json()
+    assert (len(scan["world_from_camera"]), scan["up"], scan["up_from"], scan["radius_m"]) == (20, [0, 0, 1], "given", 0.9)
+
+
+@pytest.mark.parametrize(("name", "value"), [("viewpoints", 1), ("up", [0, 1]), ("up", ["nan", 0, 1]), ("standoff_m", 0)])
+def test_wrong_options_are_told(client, look, parts, name, value):
+    answer = client.post("/v1/scans", files=parts(look()), params={name: value})
+    assert (answer.status_code, answer.json()["field"].partition("[")[0]) == (422, name)
+
+
+def test_up_without_a_direction_is_told(client, look, parts):
+    answer = client.post("/v1/scans", files=parts(look()), params={"up": [0, 0, 0]})
+    assert (answer.status_code, answer.json()["field"]) == (422, "up")
+
+
+def test_unreachable_viewpoints_are_replaced(client, scan):
+    changed = client.post(f"/v1/scans/{scan['id']}/exclude", json={"viewpoints": [1, 4]}).json()
+    before, after = (np.array(each["world_from_camera"])[:, :3, 3] for each in (scan, changed))
+    moved = np.linalg.norm(before - after, axis=1) > 0.01
+    assert np.flatnonzero(moved).tolist() == [1, 4]
+    assert changed["excluded"] == 2
+    assert client.get(f"/v1/scans/{scan['id']}").json() == changed
+
+
+def test_an_unknown_viewpoint_cannot_be_excluded(client, scan):
+    answer = client.post(f"/v1/scans/{scan['id']}/exclude", json={"viewpoints": [99]})
+    assert (answer.status_code, answer.json()["field"]) == (422, "viewpoints")
+
+
+def test_a_scan_expires(settings, backbone, look, parts):
+    with TestClient(create_app(settings.model_copy(update={"scan_expiry_h": 1e-6}), backbone=backbone)) as client:
+        scan = client.post("/v1/scans", files=parts(look())).json()
+        assert client.get(f"/v1/scans/{scan['id']}").json()["state"] == "expired"
+        answer = add(client, scan, parts, look())
+        assert answer.status_code == 409
+        assert "expired" in answer.json()["detail"]
+
+
+def test_exclusions_and_coverage_survive_a_restart(settings, backbone, look, parts):
+    with TestClient(create_app(settings, backbone=backbone)) as client:
+        scan = client.post("/v1/scans", files=parts(look())).json()
+        client.post(f"/v1/scans/{scan['id']}/exclude", json={"viewpoints": [0]})
+        add(client, scan, parts, look().select([0, 1]))
+        before = client.get(f"/v1/scans/{scan['id']}").json()
+    with TestClient(create_app(settings, backbone=backbone)) as client:
+        assert client.get(f"/v1/scans/{scan['id']}").json() == before

@@ -18,7 +18,7 @@ from core.sim3 import Sim3
 from core.views import Burst
 from store.memory import Memory
 from store.observations import Answer
-from store.records import Pose
+from store.records import Alternative, Pose
 
 FEATURES = {"a": np.arange(3)}
 NOVEL = Answer("novel", None, "map", Decision("novel", "paper_mean", 0.4, (("x", 0.1),)), None, None, None, {"total": 12.5})
@@ -27,7 +27,9 @@ NOVEL = Answer("novel", None, "map", Decision("novel", "paper_mean", 0.4, (("x",
 def known(category_id: str) -> Answer:
     """An answer with everything a pose has."""
     turn = Sim3(0.7, Rotation.from_rotvec([0.1, 0.2, 0.3]).as_matrix(), np.array([1.0, 2, 3]))
-    pose = Pose(turn, OrientedBox(np.eye(4), np.ones(3)), 10, 20, 3, 0.01, 0.7, None, ((turn, 0.5),))
+    pose = Pose(
+        turn, OrientedBox(np.eye(4), np.ones(3)), 10, 20, 3, 0.01, 0.7, None, (Alternative(turn, 0.5, 0.1),), ((1.0, 2, 3, 4), None)
+    )
     return replace(NOVEL, outcome="known", category_id=category_id, pose=pose)
 
 
@@ -41,7 +43,10 @@ def test_a_pose_comes_back_exactly(memory: Memory, reference: Reference, burst: 
     answer = known(memory.categories.create(reference, burst, encoded).id)
     pose = memory.observations.create(answer, burst, FEATURES).pose
     assert np.array_equal(pose.target_from_reference.as_matrix(), answer.pose.target_from_reference.as_matrix())
-    assert np.array_equal(pose.alternatives[0][0].as_matrix(), answer.pose.alternatives[0][0].as_matrix())
+    (alternative,) = pose.alternatives
+    assert np.array_equal(alternative.target_from_reference.as_matrix(), answer.pose.target_from_reference.as_matrix())
+    assert (alternative.score, alternative.confidence) == (0.5, 0.1)
+    assert pose.boxes_px == ((1, 2, 3, 4), None)
     assert (pose.inliers, pose.correspondences, pose.best_view) == (10, 20, 3)
     assert (pose.residual_m, pose.score, pose.confidence) == (0.01, 0.7, None)
 

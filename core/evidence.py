@@ -1,0 +1,54 @@
+"""How much the answer about a burst rests on: how many views, from how many sides, and what is wrong with them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from core.encode import EncodedBurst
+from core.quality import ViewFault, faults, region_of_encoded
+from core.views import Burst
+
+ONE_SIDE_DEG = 20.0
+"""Views that differ by less, by angle about the object, show one side of it."""
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What a burst shows of its object."""
+
+    views: int
+    shown: int
+    """Views in which the object was found."""
+    with_depth: int
+    """Of these, how many have depth on it."""
+    spread_deg: float | None
+    """Largest angle about the object between two of them; None without cameras and depth."""
+    faults: tuple[tuple[ViewFault, ...], ...]
+    """Of each view."""
+
+    @property
+    def weakness(self) -> str | None:
+        """Why the answer rests on little, in one sentence; None where it does not."""
+        if self.shown == 1:
+            return "it rests on one view, which shows one side of the object: a few more from other sides would make it much surer"
+        if self.spread_deg is not None and self.spread_deg < ONE_SIDE_DEG:
+            return f"its views are within {self.spread_deg:.0f}° and show one side of the object: add some from other sides"
+        return None
+
+
+def evidence(burst: Burst, encoded: EncodedBurst) -> Evidence:
+    """Of a burst and its encoding."""
+    shown = [view for view in encoded.views if len(view.cells)]
+    found = tuple(faults(view, region_of_encoded(seen)) for view, seen in zip(burst.views, encoded.views))
+    return Evidence(len(burst), len(shown), sum(bool(view.trusted.any()) for view in shown), _spread_deg(encoded), found)
+
+
+def _spread_deg(encoded: EncodedBurst) -> float | None:
+    positions = [view.camera.world_from_camera[:3, 3] for view in encoded.views if view.camera is not None and len(view.cells)]
+    if not positions or not len(encoded.cloud_m):
+        return None
+    rays = np.stack(positions) - np.median(encoded.cloud_m, axis=0)
+    rays /= np.linalg.norm(rays, axis=1, keepdims=True).clip(1e-12)
+    return float(np.degrees(np.arccos(np.clip(rays @ rays.T, -1, 1)).max()))

@@ -1,0 +1,115 @@
+"""What a person or a robot changes in the memory by their own word: names, merges, splits, forgetting."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from core.descriptors import unit
+from core.encode import Encoder
+from core.errors import Conflict, InvalidInput, Unavailable
+from core.novelty import Member, named_score
+from core.reference import MIN_VIEWS, build_reference
+from core.views import Burst, FloatArray
+from service.events import Events
+from store.memory import Memory
+from store.records import Category, Instance
+
+
+@dataclass(frozen=True, eq=False)
+class Similarities:
+    """How like each other a category's bursts are, and how like it the other categories."""
+
+    instances: tuple[Instance, ...]
+    matrix: FloatArray
+    """Of each pair of instances, shape (I, I)."""
+    categories: tuple[tuple[str, float], ...]
+    """(id, similarity) of the other categories, most similar first."""
+
+
+class Curation:
+    """Changes of one memory's categories."""
+
+    def __init__(self, encoder: Encoder, memory: Memory, events: Events, score: str) -> None:
+        self._encoder = encoder
+        self._memory = memory
+        self._events = events
+        self._score = score
+
+    def rename(self, category_id: str, name: str | None, *, actor: str | None = None) -> Category:
+        """Raises NotFound."""
+        category = self._memory.categories.rename(category_id, name, actor=actor)
+        self._events.publish("category_renamed", id=category_id, name=name)
+        return category
+
+    def delete(self, category_id: str, *, actor: str | None = None) -> None:
+        """Forgets a category with all its bursts. Raises NotFound."""
+        self._memory.categories.delete(category_id, actor=actor)
+        self._events.publish("category_deleted", id=category_id)
+
+    def merge(self, category_id: str, into_id: str, *, actor: str | None = None) -> Category:
+        """The bursts of one category join another, whose reference stays. Raises NotFound, InvalidInput for a category with itself."""
+        if category_id == into_id:
+            raise InvalidInput("from", "is the category itself; name another one")
+        category = self._memory.categories.merge(category_id, into_id, actor=actor)
+        self._events.publish("category_merged", id=category_id, into=into_id)
+        return category
+
+    def split(self, category_id: str, instance_ids: Sequence[str], name: str | None, *, actor: str | None = None) -> Category:
+        """Bursts leave their category for a new one, whose reference is made of the first of them that allows it.
+
+        Raises NotFound, InvalidInput for instances of another category or all of this one's, Conflict where none can be a reference.
+        """
+        own = {instance.id for instance in self._memory.instances.of(category_id)} if self._memory.categories.get(category_id) else set()
+        chosen = list(dict.fromkeys(instance_ids))
+        for index, instance_id in enumerate(chosen):
+            if instance_id not in own:
+                raise InvalidInput(f"instance_ids[{index}]", f"{instance_id!r} is no instance of category {category_id!r}")
+        if len(chosen) == len(own):
+            raise InvalidInput("instance_ids", "are all instances of the category; leave it at least one, or rename it")
+        burst = self._reference_burst(chosen)
+        reference = build_reference(self._encoder.encode(burst))
+        category = self._memory.categories.split(category_id, chosen, reference, burst, name=name, actor=actor)
+        self._events.publish("category_split", id=category.id, name=name, split_from=category_id)
+        return category
+
+    def forget_instance(self, category_id: str, instance_id: str, *, actor: str | None = None) -> None:
+        """Takes a burst out of a category. Raises NotFound, Conflict for its last one."""
+        self._memory.instances.forget(category_id, instance_id, actor=actor)
+        self._events.publish("instance_forgotten", id=instance_id, category_id=category_id)
+
+    def similarities(self, category_id: str) -> Similarities:
+        """By the score that decides. Raises NotFound, and Unavailable where tokens of the category are damaged."""
+        self._memory.categories.get(category_id)
+        score = named_score(self._score)
+        bursts: dict[str, list[FloatArray]] = {}
+        for member in self._memory.instances.members():
+            bursts.setdefault(member.category_id, []).append(unit(_tokens(member, score.token)))
+        instances = tuple(self._memory.instances.of(category_id))
+        own = bursts.pop(category_id, [])
+        if len(own) != len(instances):
+            raise Unavailable(f"tokens of category {category_id!r} are damaged; `onelook memory check` says which")
+        matrix = np.array([[score.similarity(left, right) for right in own] for left in own])
+        others = {each: max(score.similarity(left, right) for left in own for right in theirs) for each, theirs in bursts.items()}
+        ranked = sorted(others.items(), key=lambda entry: (-entry[1], entry[0]))
+        return Similarities(instances, matrix, tuple(ranked))
+
+    def _reference_burst(self, instance_ids: Sequence[str]) -> Burst:
+        for instance_id in instance_ids:
+            if not self._memory.instances.get(instance_id).kept:
+                continue
+            burst = self._memory.instances.burst(instance_id)
+            sound = [index for index, view in enumerate(burst.views) if view.camera is not None and view.depth_m is not None]
+            if len(sound) >= MIN_VIEWS:
+                return burst.select(sound)
+        raise Conflict(
+            f"none of these instances can be a reference: that takes the kept views of one, at least {MIN_VIEWS} with cameras and depth; "
+            "scan the object instead"
+        )
+
+
+def _tokens(member: Member, token: str) -> FloatArray:
+    tokens: FloatArray = getattr(member, token)
+    return tokens

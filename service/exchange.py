@@ -1,0 +1,95 @@
+"""What every exchange over HTTP has in common: unchanged reads are not sent again, repeated writes are not done again."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Coroutine
+from typing import Any
+
+from anyio.to_thread import run_sync
+from fastapi import Request, Response
+from fastapi.routing import APIRoute
+
+from core.errors import InvalidInput
+from service.agent import Agent
+from store.requests import Earlier, Reply
+
+Answer = Callable[[Request], Coroutine[Any, Any, Response]]
+KEY = "Idempotency-Key"
+LONGEST_KEY = 200
+REPEATED = "Idempotency-Replayed"
+"""Header of an answer that was given before."""
+
+
+class MemoryRoute(APIRoute):
+    """A route that reads or changes the memory.
+
+    A GET is answered with an ETag that the memory's version gives, and with 304 where the caller has that version already. A POST with
+    an Idempotency-Key is carried out once: its repetitions get the first answer again.
+    """
+
+    def get_route_handler(self) -> Answer:
+        """FastAPI's, with that around it."""
+        answer: Answer = super().get_route_handler()
+        methods = self.methods or set()
+
+        async def exchange(request: Request) -> Response:
+            if "GET" in methods:
+                return await _conditional(request, answer)
+            if "POST" in methods:
+                return await _once(request, answer, self.path_format)
+            return await answer(request)
+
+        return exchange
+
+
+async def _conditional(request: Request, answer: Answer) -> Response:
+    memory = _agent(request).memory
+    version = await run_sync(lambda: memory.version)  # before the answer is made: it may be newer than its tag, never older
+    tag = f'W/"{version}"'
+    known = {each.strip() for each in request.headers.get("if-none-match", "").split(",")}
+    response = Response(status_code=304) if known & {tag, "*"} else await answer(request)
+    response.headers["ETag"] = tag
+    response.headers["Cache-Control"] = "no-cache"  # to be kept, and asked for again with If-None-Match
+    return response
+
+
+async def _once(request: Request, answer: Answer, route: str) -> Response:
+    key = request.headers.get(KEY)
+    if key is None:
+        return await answer(request)
+    if not 1 <= len(key) <= LONGEST_KEY:
+        raise InvalidInput(KEY, f"has {len(key)} characters; send 1 to {LONGEST_KEY}, such as a UUID made anew for each request")
+    digest = _digest(request, await request.body())
+    # Entered on the event loop: the key travels to the thread that changes the memory in the context of this task.
+    with _agent(request).memory.requests.once(key, route, digest) as once:
+        if once.earlier is not None:
+            return await run_sync(_again, request, once.earlier, route)
+        response = await answer(request)
+        if response.status_code < 300:
+            once.reply = Reply(response.status_code, response.headers.get("content-type", ""), bytes(response.body))
+        return response
+
+
+def _digest(request: Request, body: bytes) -> str:
+    """Of what is asked; the boundary of a multipart body is another one at each repetition, and says nothing."""
+    kind, _, parameters = request.headers.get("content-type", "").partition(";")
+    boundary = parameters.partition("boundary=")[2].strip().strip('"').encode()
+    content = body.replace(boundary, b"") if boundary else body
+    asked = f"{request.url.path}?{request.url.query}\n{kind}\n".encode()
+    return hashlib.sha256(asked + content).hexdigest()
+
+
+def _again(request: Request, earlier: Earlier, route: str) -> Response:
+    """The first answer; where that was lost because the service ended just then, what the request made, as it is now."""
+    reply = earlier.reply
+    if reply is None:
+        assert earlier.result_id is not None, "what changed nothing is not kept"
+        made = request.app.state.made[route](_agent(request), earlier.result_id)
+        reply = Reply(200, "application/json", made.model_dump_json(by_alias=True).encode())
+    return Response(reply.body, reply.status, {REPEATED: "true"}, reply.media_type)
+
+
+def _agent(request: Request) -> Agent:
+    agent: Agent = request.app.state.agent
+    return agent

@@ -1,0 +1,58 @@
+"""Every curl of docs/http.md works, one after the other, against a live service."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+import uvicorn
+
+from core.backbones.base import Features
+from service.app import create_app
+
+ROOT = Path(__file__).parents[2]
+PAGE = ROOT / "docs" / "http.md"
+SCRIPT = "\n".join(re.findall(r"^```sh\n(.*?)^```", PAGE.read_text(), re.MULTILINE | re.DOTALL))
+
+
+@pytest.fixture
+def url(settings: Any, backbone: Any) -> Iterator[str]:
+    """A live service that takes the middle of every image for the object."""
+
+    class Middle(type(backbone)):  # type: ignore[misc]
+        def extract(self, images: np.ndarray) -> Features:
+            found = super().extract(images)
+            disc = np.zeros(images.shape[1:3], np.float32)
+            cv2.circle(disc, (len(disc) // 2, len(disc) // 2), round(0.35 * len(disc)), 1.0, -1)
+            small = cv2.resize(disc, found.attention.shape[1:], interpolation=cv2.INTER_AREA)
+            return Features(found.patches, found.cls, np.stack([small] * len(images)), np.stack([disc] * len(images)))
+
+    server = uvicorn.Server(uvicorn.Config(create_app(settings, backbone=Middle()), host="127.0.0.1", port=0, log_level="warning"))
+    thread = threading.Thread(target=server.run, daemon=True)
+    thread.start()
+    while not server.started:
+        time.sleep(0.01)
+    yield f"http://127.0.0.1:{server.servers[0].sockets[0].getsockname()[1]}"
+    server.should_exit = True
+    thread.join()
+
+
+@pytest.mark.skipif(shutil.which("curl") is None, reason="needs curl")
+def test_every_curl_of_the_page_works(url: str, tmp_path: Path) -> None:
+    (tmp_path / "tests").symlink_to(ROOT / "tests")
+    (tmp_path / "docs").symlink_to(ROOT / "docs")
+    assert SCRIPT.count("curl -s ") + SCRIPT.count("curl -sN ") == len(re.findall(r"^\s*curl ", SCRIPT, re.MULTILINE)) > 30
+    script = SCRIPT.replace("http://127.0.0.1:8000", url).replace("curl -s", "curl --fail-with-body --show-error -s")
+    ran = subprocess.run(["bash", "-exc", script], cwd=tmp_path, capture_output=True, text=True, timeout=120)
+    assert ran.returncode == 0, f"{ran.stdout[-500:]}\n{ran.stderr[-2000:]}"
+    for picture in tmp_path.glob("*.png"):
+        assert cv2.imread(str(picture)) is not None, picture.name

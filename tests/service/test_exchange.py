@@ -1,0 +1,126 @@
+"""Repeated writes are not done again, unchanged reads are not sent again."""
+
+from __future__ import annotations
+
+import threading
+
+import pytest
+from fastapi.testclient import TestClient
+
+from service.app import create_app
+
+KEY = {"Idempotency-Key": "4f1c"}
+
+
+def observations(client):
+    return client.get("/v1/observations").json()["observations"]
+
+
+def test_a_repeated_observation_is_answered_again_and_kept_once(client, look, parts):
+    files = parts(look())
+    first, again = (client.post("/v1/observations", files=files, headers=KEY) for _ in range(2))  # each with a boundary of its own
+    assert (first.status_code, again.status_code) == (201, 201)
+    assert again.json() == first.json()
+    assert again.headers["content-type"] == first.headers["content-type"]
+    assert ("idempotency-replayed" in first.headers, again.headers["idempotency-replayed"]) == (False, "true")
+    assert len(observations(client)) == 1
+
+
+def test_a_retry_never_makes_two_categories(client, look, parts):
+    scan = client.post("/v1/scans", files=parts(look())).json()
+    client.post(f"/v1/scans/{scan['id']}/views", files=parts(look()))
+    answers = [client.post(f"/v1/scans/{scan['id']}/complete", json={"name": "ball"}, headers=KEY) for _ in range(3)]
+    assert {answer.status_code for answer in answers} == {201}
+    assert len({answer.json()["id"] for answer in answers}) == 1
+    assert len(client.get("/v1/categories").json()["categories"]) == 1
+
+
+def test_a_key_with_another_body_is_a_conflict(client, look, parts):
+    client.post("/v1/observations", files=parts(look()), headers=KEY)
+    answer = client.post("/v1/observations", files=parts(look("dark")), headers=KEY)
+    assert answer.status_code == 409
+    assert "new key" in answer.json()["detail"]
+
+
+def test_a_key_with_other_options_is_a_conflict(client, look, parts):
+    client.post("/v1/observations", files=parts(look()), headers=KEY)
+    assert client.post("/v1/observations", files=parts(look()), headers=KEY, params={"seed": 1}).status_code == 409
+
+
+def test_another_key_is_another_request(client, look, parts):
+    for key in ("a", "b"):
+        client.post("/v1/observations", files=parts(look()), headers={"Idempotency-Key": key})
+    assert len(observations(client)) == 2
+
+
+def test_a_refused_request_may_be_mended_under_its_key(client, look, parts):
+    wrong = client.post("/v1/observations", files=parts(look()), params={"variant": "nonsense"}, headers=KEY)
+    assert wrong.status_code == 422
+    assert client.post("/v1/observations", files=parts(look()), headers=KEY).status_code == 201
+
+
+@pytest.mark.parametrize("key", ["", "k" * 201])
+def test_a_key_has_a_length(client, look, parts, key):
+    answer = client.post("/v1/observations", files=parts(look()), headers={"Idempotency-Key": key})
+    assert (answer.status_code, answer.json()["field"]) == (422, "Idempotency-Key")
+
+
+def test_a_restarted_service_knows_the_key(settings, backbone, look, parts):
+    files, answers = parts(look()), []
+    for _ in range(2):
+        with TestClient(create_app(settings, backbone=backbone)) as client:
+            answers.append(client.post("/v1/observations", files=files, headers=KEY).json())
+    assert answers[0] == answers[1]
+
+
+def test_an_answer_lost_with_the_process_is_made_again_from_what_was_kept(client, look, parts):
+    first = client.post("/v1/observations", files=parts(look()), headers=KEY).json()
+    with client.app.state.agent.memory._connection.housekeeping() as db:
+        db.execute("UPDATE requests SET status = NULL, media_type = NULL, body = NULL")
+    again = client.post("/v1/observations", files=parts(look()), headers=KEY)
+    assert (again.status_code, again.json()) == (200, first)
+    assert len(observations(client)) == 1
+
+
+def test_the_same_request_twice_at_once_is_done_once(settings, backbone, look, parts):
+    started, finish = threading.Event(), threading.Event()
+
+    class Slow(type(backbone)):
+        def extract(self, images):
+            started.set()
+            finish.wait(10)
+            return super().extract(images)
+
+    with TestClient(create_app(settings, backbone=Slow())) as client:
+        files, answers = parts(look()), []
+        first = threading.Thread(target=lambda: answers.append(client.post("/v1/observations", files=files, headers=KEY)))
+        first.start()
+        started.wait(10)
+        meanwhile = client.post("/v1/observations", files=files, headers=KEY)
+        finish.set()
+        first.join()
+        assert (meanwhile.status_code, meanwhile.headers["retry-after"]) == (409, "1")
+        assert answers[0].status_code == 201
+        assert len(observations(client)) == 1
+
+
+def test_an_unchanged_read_is_not_sent_again(client, learn):
+    category = learn()
+    for path in (
+        "/v1/categories",
+        f"/v1/categories/{category['id']}",
+        f"/v1/categories/{category['id']}/views/0/pca.png",
+        "/v1/observations",
+    ):
+        answer = client.get(path)
+        unchanged = client.get(path, headers={"If-None-Match": answer.headers["etag"]})
+        assert (unchanged.status_code, unchanged.content) == (304, b""), path
+
+
+def test_a_change_makes_another_tag(client, learn):
+    path = f"/v1/categories/{learn()['id']}"
+    before = client.get(path).headers["etag"]
+    client.patch(path, json={"name": "ball"})
+    after = client.get(path, headers={"If-None-Match": before})
+    assert (after.status_code, after.json()["name"]) == (200, "ball")
+    assert after.headers["etag"] != before
