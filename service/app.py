@@ -59,14 +59,28 @@ def create_app(settings: Settings, *, backbone: Backbone | None = None) -> FastA
 def open_agent(settings: Settings, backbone: Backbone | None = None) -> Iterator[Agent]:
     """The agent of these settings, with its memory open until the end; loads its backbone unless one is given.
 
-    Raises what `Memory.open`, `load_backbone` and `Agent` raise.
+    Raises what `Settings.require_safe`, `Memory.open`, `load_backbone` and `Agent` raise.
     """
-    config = AgentConfig(settings.score, settings.threshold, settings.variant, settings.scan_views)
-    config.validate()
-    with Memory.open(settings.data_dir, settings.retention) as memory:
-        loaded = backbone or load_backbone(settings.backbone, device=settings.device, report=log.info)
+    with _checked(settings, backbone) as (memory, loaded, config):
         agent = Agent(BatchingBackbone(loaded), memory, config)
         try:
             yield agent
         finally:
             agent.events.close()
+
+
+def checked_backbone(settings: Settings) -> Backbone:
+    """The backbone of these settings, once all is checked that can keep the service from starting. Raises as `open_agent` does."""
+    with _checked(settings) as (memory, loaded, _):
+        memory.require_backbone(loaded.name, loaded.fingerprint)
+        return loaded
+
+
+@contextmanager
+def _checked(settings: Settings, backbone: Backbone | None = None) -> Iterator[tuple[Memory, Backbone, AgentConfig]]:
+    """What is wrong with the settings is told before a backbone is loaded, which takes long."""
+    settings.require_safe()
+    config = AgentConfig(settings.score, settings.threshold, settings.variant, settings.scan_views)
+    config.validate()
+    with Memory.open(settings.data_dir, settings.retention) as memory:
+        yield memory, backbone or load_backbone(settings.backbone, device=settings.device, report=log.info), config

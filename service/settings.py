@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from datetime import timedelta
+from ipaddress import ip_address
 from pathlib import Path
 
 from platformdirs import user_data_path
@@ -10,6 +11,7 @@ from pydantic import Field
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 from core.backbones.dino import EMBEDDED
+from core.errors import InvalidInput
 from core.novelty import DEFAULT_SCORE
 from store.retention import Retention
 
@@ -22,8 +24,11 @@ class Settings(BaseSettings):
     data_dir: Path = Field(
         default_factory=lambda: user_data_path("onelook") / "memory", description="Folder of the memory; made where it is missing."
     )
-    host: str = Field(
-        "127.0.0.1", description="Address to listen on. There is no authentication: keep it local, or behind a proxy that has."
+    host: str = Field("127.0.0.1", description="Address to listen on.")
+    trust_network: bool = Field(
+        False,
+        description="Listen on an address that other machines reach, although nobody is asked who they are: only behind a proxy that "
+        "asks, or in a network that is trusted.",
     )
     port: int = Field(8000, ge=0, le=65535, description="Port to listen on; 0 takes a free one.")
     backbone: str = Field(EMBEDDED, description="`dinov2-s14`, `dino-s8`, or a folder or hub name of the DINO family.")
@@ -44,3 +49,24 @@ class Settings(BaseSettings):
     def retention(self) -> Retention:
         """How much the memory keeps, and how long."""
         return Retention(self.keep_observations, timedelta(days=self.undo_days), timedelta(hours=self.scan_expiry_h))
+
+    def require_safe(self) -> None:
+        """Raises InvalidInput for settings that would expose or starve the service."""
+        if not (self.trust_network or self._local):
+            raise InvalidInput(
+                "ONELOOK_HOST",
+                f"is {self.host}, which other machines reach, and there is no authentication: listen on 127.0.0.1 behind a proxy that "
+                "has, or set ONELOOK_TRUST_NETWORK=true where everyone on the network may teach and delete",
+            )
+        if self.scan_views > self.max_views:
+            raise InvalidInput(
+                "ONELOOK_SCAN_VIEWS",
+                f"asks for {self.scan_views} views of a scan, ONELOOK_MAX_VIEWS takes {self.max_views} in one request; raise it",
+            )
+
+    @property
+    def _local(self) -> bool:
+        try:
+            return self.host == "localhost" or ip_address(self.host).is_loopback
+        except ValueError:  # a name, which may be anywhere
+            return False

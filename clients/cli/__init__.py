@@ -47,7 +47,7 @@ app = typer.Typer(
     no_args_is_help=True,
     pretty_exceptions_show_locals=False,
 )
-app.command("serve")(service.serve)
+app.command("serve", cls=service.ServeCommand)(service.serve)
 app.command("observe")(robot.observe)
 app.command("scan")(robot.scan)
 app.add_typer(memory.app, name="categories")

@@ -6,16 +6,38 @@ import contextlib
 import logging.config
 import socket
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from typer.core import TyperCommand
 
+from clients.cli.terminal import print_facts
 from core.errors import InvalidInput, Unavailable
 
 if TYPE_CHECKING:
+    from pydantic.fields import FieldInfo
+
     from service.settings import Settings
 
 log = logging.getLogger("onelook")
+
+
+class ServeCommand(TyperCommand):
+    """Its help lists every setting."""
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """The options, then the variables."""
+        super().format_help(ctx, formatter)
+        from service.settings import Settings
+
+        rows = [(f"ONELOOK_{name.upper()}", field) for name, field in Settings.model_fields.items()]
+        print_facts({name: f"{field.description} {_default(field)}" for name, field in rows}, title="Settings from the environment")
+
+
+def _default(field: FieldInfo) -> str:
+    if field.default_factory is not None:
+        return f"({field.get_default(call_default_factory=True)})"
+    return "" if field.default is None else f"({field.default})"
 
 
 def serve(
@@ -26,19 +48,18 @@ def serve(
     device: Annotated[str | None, typer.Option(help="Torch device: cpu where left out, cuda, cuda:1.")] = None,
     threshold: Annotated[float | None, typer.Option(help="Least similarity of a known object; the score's own where left out.")] = None,
 ) -> None:
-    """Start the service. Everything else is set by ONELOOK_* in the environment."""
+    """Start the service. What has no option here is set by the variables below."""
     import uvicorn
 
-    from service.app import create_app, open_agent
+    from service.app import checked_backbone, create_app
 
     given = {"host": host, "port": port, "data_dir": data_dir, "backbone": backbone, "device": device, "threshold": threshold}
     settings = _settings({name: value for name, value in given.items() if value is not None})
     logging.config.dictConfig(_log_config())
     with _bound(settings.host, settings.port) as listener:
         # Opened once before uvicorn starts, which would wrap the sentence that says what is wrong in a traceback.
-        with open_agent(settings) as agent:
-            loaded = agent.backbone
-        server = uvicorn.Server(uvicorn.Config(create_app(settings, backbone=loaded), log_config=None))
+        app = create_app(settings, backbone=checked_backbone(settings))
+        server = uvicorn.Server(uvicorn.Config(app, log_config=None))
         log.info("serving on http://%s:%d, memory in %s; Ctrl+C stops it", settings.host, listener.getsockname()[1], settings.data_dir)
         with contextlib.suppress(KeyboardInterrupt):
             server.run(sockets=[listener])

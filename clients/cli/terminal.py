@@ -48,9 +48,9 @@ def print_table(rows: Sequence[Mapping[str, str]], empty: str) -> None:
     console.print(table)
 
 
-def print_facts(facts: Mapping[str, object]) -> None:
+def print_facts(facts: Mapping[str, object], title: str | None = None) -> None:
     """One line a fact."""
-    table = Table(show_header=False, box=None, pad_edge=False)
+    table = Table(show_header=False, box=None, pad_edge=False, title=title, title_justify="left")
     table.add_column(style="dim")
     table.add_column(overflow="fold")
     for name, value in facts.items():

@@ -12,6 +12,7 @@ import uvicorn
 from typer.testing import CliRunner, Result
 
 import service.app
+import service.settings
 from clients.cli import app
 from core.errors import Unavailable
 from store.memory import Memory
@@ -85,6 +86,29 @@ def test_a_memory_that_another_process_has_open(serve: Callable[..., Result], tm
 def test_a_memory_that_cannot_be_written(serve: Callable[..., Result], tmp_path: Path) -> None:
     (tmp_path / "memory").write_text("a file, not a folder")
     refused(serve(), "cannot open the memory", "ONELOOK_DATA_DIR")
+
+
+def test_every_setting_is_in_the_help(serve: Callable[..., Result]) -> None:
+    shown = serve("--help").output
+    for name in service.settings.Settings.model_fields:
+        assert f"ONELOOK_{name.upper()}" in shown
+
+
+def test_an_address_that_others_reach_must_be_meant(serve: Callable[..., Result], monkeypatch: pytest.MonkeyPatch) -> None:
+    refused(serve("--host", "0.0.0.0"), "ONELOOK_HOST", "no authentication", "ONELOOK_TRUST_NETWORK")
+    monkeypatch.setenv("ONELOOK_TRUST_NETWORK", "true")
+    assert serve("--host", "0.0.0.0").exit_code == 0
+
+
+def test_wrong_settings_are_told_before_a_backbone_is_loaded(serve: Callable[..., Result], monkeypatch: pytest.MonkeyPatch) -> None:
+    def load(name: str, device: str, report: Callable[[str], None]) -> None:
+        raise AssertionError("loaded")
+
+    monkeypatch.setattr(service.app, "load_backbone", load)
+    for variable, value in (("VARIANT", "nonsense"), ("SCORE", "nonsense"), ("SCAN_VIEWS", "64")):
+        with monkeypatch.context() as environment:
+            environment.setenv(f"ONELOOK_{variable}", value)
+            refused(serve(), value)
 
 
 def test_a_used_port(serve: Callable[..., Result]) -> None:
