@@ -79,7 +79,7 @@ def import_archive(
 ) -> Import:
     """See `Memory.import_archive`; `existing` are the memory's categories."""
     try:
-        with zipfile.ZipFile(path) as archive:
+        with untrusted.opened(path, path.name) as archive:
             found = untrusted.entries(archive, path.stat().st_size)
             manifest = _manifest(archive, found)
             _require_backbone(connection, manifest)
@@ -91,8 +91,6 @@ def import_archive(
                 if progress is not None:
                     progress(index + 1, len(manifest.categories))
             return _bring(connection, archive, found, manifest, parts, duplicates, existing, path.name, actor)
-    except zipfile.BadZipFile as error:
-        raise InvalidInput(untrusted.FIELD, f"{path.name} is no zip file ({error}); `onelook memory export` writes one") from None
     except OSError as error:
         raise Unavailable(f"cannot read {path}: {error}") from error
 

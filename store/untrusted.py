@@ -6,9 +6,12 @@ import io
 import math
 import re
 import stat
+import struct
 import zipfile
 from collections.abc import Mapping
-from typing import Any
+from pathlib import Path
+from tokenize import TokenError
+from typing import IO, Any
 
 import cv2
 import numpy as np
@@ -25,6 +28,14 @@ MAX_ENTRIES = 100_000
 MAX_HEADER_BYTES = 4096
 HEADER_READERS = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
 PNG_START = re.compile(rb"\x89PNG\r\n\x1a\n\x00\x00\x00\rIHDR(....)(....)", re.DOTALL)
+
+
+def opened(source: Path | IO[bytes], name: str) -> zipfile.ZipFile:
+    """A zip file. Raises InvalidInput where it is none, OSError where it is not there."""
+    try:
+        return zipfile.ZipFile(source)
+    except (zipfile.BadZipFile, NotImplementedError, ValueError, EOFError, struct.error) as error:
+        raise InvalidInput(FIELD, f"{name} is no zip file that can be read ({error})") from None
 
 
 def entries(archive: zipfile.ZipFile, limit: int) -> dict[str, zipfile.ZipInfo]:
@@ -74,14 +85,9 @@ def require_picture(picture: bytes, name: str) -> None:
 
 def arrays(npz: bytes, name: str) -> Mapping[str, NDArray[Any]]:
     """The arrays of an npz file: numbers and text only. Raises InvalidInput."""
-    try:
-        with zipfile.ZipFile(io.BytesIO(npz)) as archive:
-            return {
-                each.removesuffix(".npy"): _array(content(archive, info), f"{name}: {each}")
-                for each, info in entries(archive, len(npz)).items()
-            }
-    except zipfile.BadZipFile as error:
-        raise InvalidInput(FIELD, f"{name!r} is no npz file ({error})") from None
+    with opened(io.BytesIO(npz), name) as archive:
+        found = entries(archive, len(npz))
+        return {each.removesuffix(".npy"): _array(content(archive, info), f"{name}: {each}") for each, info in found.items()}
 
 
 def _array(written: bytes, name: str) -> NDArray[Any]:
@@ -95,6 +101,6 @@ def _array(written: bytes, name: str) -> NDArray[Any]:
             raise InvalidInput(FIELD, f"{name!r} has not the size that its shape {shape} says")
         stream.seek(0)
         found: NDArray[Any] = npy.read_array(stream, allow_pickle=False)
-    except (ValueError, KeyError) as error:
+    except (ValueError, KeyError, SyntaxError, TokenError, RecursionError) as error:  # what parsing its header raises
         raise InvalidInput(FIELD, f"{name!r} is no NumPy array ({error})") from None
     return found

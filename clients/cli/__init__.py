@@ -10,7 +10,7 @@ from typing import Any
 import typer
 from typer.core import TyperGroup
 
-from clients.cli import bench, data, demo, memory, robot, service
+from clients.cli import bench, data, demo, memory, render, robot, service
 from clients.cli.terminal import errors
 from core.errors import OneLookError
 
@@ -53,6 +53,7 @@ app.command("scan")(robot.scan)
 app.add_typer(memory.app, name="categories")
 app.command("memory")(memory.show_memory)
 app.command("simulate")(demo.simulate)
+app.command("render")(render.render)
 app.command("samples")(data.samples)
 app.command("convert")(data.convert)
 app.add_typer(bench.app, name="bench")

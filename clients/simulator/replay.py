@@ -1,23 +1,16 @@
-"""Worlds a simulated robot can look at: one protocol, and a recorded sequence that follows it."""
+"""A recorded sequence as a world."""
 
 from __future__ import annotations
 
-from typing import Protocol
+from dataclasses import dataclass
 
 import numpy as np
 
 from clients.datasets.folders import Sequence, load_burst
 from clients.datasets.viewpoints import aim_point, spread
+from clients.simulator.world import WorldObject
 from core.scan import nearest_view
 from core.views import Burst, FloatArray, View
-
-
-class World(Protocol):
-    """Something a camera can be moved about in."""
-
-    def capture(self, world_from_camera: FloatArray) -> View:
-        """The view from a pose, shape (4, 4), or from as near to it as this world can; the view's camera says where it was taken."""
-        ...
 
 
 class ReplayWorld:
@@ -35,6 +28,22 @@ class ReplayWorld:
         self._center_m = aim_point(self._recorded.cameras)
         self._unused = set(range(len(self._recorded)))
 
+    @property
+    def objects(self) -> list[WorldObject]:
+        """The one that was recorded."""
+        each = self.sequence
+        return [WorldObject(each.category, each.instance, each.world_from_model, each.symmetries)]
+
+    @property
+    def center_m(self) -> FloatArray:
+        """What the recording cameras aimed at, shape (3,)."""
+        return self._center_m
+
+    def viewpoints(self, count: int, seed: int) -> list[FloatArray]:
+        """Recorded poses, spread around the object."""
+        chosen = spread(self._recorded.cameras, count, seed % len(self._recorded))
+        return [self._recorded.cameras[index].world_from_camera for index in chosen]
+
     def capture(self, world_from_camera: FloatArray) -> View:
         """The nearest recorded view; appends to `offsets_deg` how far off it is."""
         candidates = sorted(self._unused or range(len(self._recorded)))
@@ -44,5 +53,26 @@ class ReplayWorld:
         return self._recorded.views[candidates[position]]
 
     def glance(self, count: int | None = None, first: int = 0) -> Burst:
-        """`count` recorded views (all where left out) spread around the object: what a robot sees before it is asked for any viewpoint."""
+        """`count` recorded views (all where left out) spread around the object, without using them up."""
         return self._recorded.select(spread(self._recorded.cameras, count or len(self._recorded), first % len(self._recorded)))
+
+
+@dataclass(frozen=True, eq=False)
+class ReplaySubject:
+    """A recorded object to be met."""
+
+    sequence: Sequence
+
+    @property
+    def category(self) -> str:
+        """As recorded."""
+        return self.sequence.category
+
+    @property
+    def name(self) -> str:
+        """`category/instance`."""
+        return self.sequence.name
+
+    def enter(self) -> ReplayWorld:
+        """A fresh replay: all its views are unused."""
+        return ReplayWorld(self.sequence)

@@ -283,7 +283,9 @@ def evil_references() -> dict[str, bytes]:
         "negative": npy_of("{'descr': '<f8', 'fortran_order': False, 'shape': (-1, -1)}", bytes(8)),
         "of nothing": npy_of("{'descr': '<U0', 'fortran_order': False, 'shape': (1000000000000,)}", b""),
         "no header": npy_of("__import__('os').system('true')", b""),
+        "a header that ends early": npy_of("{'descr': '<f8', 'shape': (", b""),
         "not an npz": b"GARBAGE",
+        "a zip of the future": npz(a=np.zeros(3)).replace(b"PK\x01\x02-\x03-", b"PK\x01\x02-\x03\xf0"),
         "without what a reference has": npz(a=np.zeros(3)),
     }
 

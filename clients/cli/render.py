@@ -1,0 +1,34 @@
+"""`onelook render`: objects of the rendered world as recordings."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from clients.cli.terminal import console
+
+SHEET = "contact-sheet.jpg"
+
+
+def render(
+    out: Annotated[Path, typer.Option(help="New folder for the recordings.")],
+    category: Annotated[list[str] | None, typer.Option(help="Category of the simulator; may be repeated; all where left out.")] = None,
+    instances: Annotated[int, typer.Option(min=1, help="Objects of each category.")] = 4,
+    views: Annotated[int, typer.Option(min=1, help="Views of each object.")] = 12,
+    seed: Annotated[int, typer.Option(help="Of objects, rooms, viewpoints and faults.")] = 0,
+    meshes: Annotated[
+        Path | None, typer.Option(help="Folder CATEGORY/INSTANCE.obj, .glb or .ply to render in place of the simulator's own objects.")
+    ] = None,
+) -> None:
+    """Render objects of the simulated world as recordings in the data layout, and a contact sheet of them."""
+    from rich.progress import track
+
+    from clients.simulator.raycast.export import contact_sheet, draw_models, export
+    from clients.simulator.raycast.user_meshes import find_models
+
+    models = find_models(meshes) if meshes else draw_models(category or [], instances, seed)
+    folders = list(track(export(models, views, out, seed), "rendering", total=len(models), console=console))
+    contact_sheet(folders, 8, out / SHEET)
+    console.print(f"{len(folders)} objects in {out}, {views} views each; all of them at a glance: {out / SHEET}")
