@@ -1,0 +1,51 @@
+"""The examples of docs/robot.md do what the page says."""
+
+from __future__ import annotations
+
+import asyncio
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from clients.cameras.simulated import recorded
+from clients.datasets.folders import Sequence, load_burst
+from clients.robot import RobotClient
+
+ROOT = Path(__file__).parents[2]
+LOOP, ASYNCHRONOUS, ARM = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "robot.md").read_text(), re.DOTALL)
+ADDRESS = "http://127.0.0.1:8000"
+
+
+def run(example: str, url: str) -> dict[str, Any]:
+    """The names that an example leaves behind."""
+    assert ADDRESS in example
+    names: dict[str, Any] = {}
+    exec(compile(example.replace(ADDRESS, url), "docs/robot.md", "exec"), names)
+    return names
+
+
+def test_the_loop_learns_a_category_and_knows_it_then(
+    url: str, robot: RobotClient, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(ROOT)
+    assert run(LOOP, url)["category"].name == "cup"
+    assert [each.name for each in robot.categories()] == ["cup"]
+    robot.observe(load_burst(run(LOOP, url)["cup"], range(4)), category_id=robot.categories()[0].id)  # the same burst joins
+    capsys.readouterr()
+    assert run(LOOP, url)["seen"].outcome == "known"
+    assert "[" in capsys.readouterr().out
+
+
+def test_the_asynchronous_loop_learns_too(url: str, samples: list[Sequence]) -> None:
+    meet = run(ASYNCHRONOUS, url)["meet"]
+    assert asyncio.run(meet(load_burst(samples[0], range(4)), recorded(samples[0].path))).name == "cup"
+
+
+def test_the_arms_example_needs_only_a_camera(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("clients.cameras.realsense.RealSense", lambda: "a device")
+    names: dict[str, Any] = {}
+    exec(compile(ARM, "docs/robot.md", "exec"), names)
+    assert names["camera"].device == "a device"
+    assert names["camera"].move is names["move"]
