@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from clients.datasets.sources import find_sequences
-from clients.simulator.replay import ReplayWorld, World
+from clients.simulator.replay import ReplayWorld
+from clients.simulator.world import World
 from core.errors import InvalidInput
 from core.views import FloatArray, View
 
