@@ -11,7 +11,7 @@ from core.boxes import OrientedBox
 from core.clock import StageClock
 from core.encode import EncodedBurst, Encoder
 from core.errors import InvalidInput, NoPose, Unavailable
-from core.evidence import evidence
+from core.grounds import grounds
 from core.matches import PoseEstimate
 from core.novelty import Decision, decide, named_score
 from core.packing import burst_from_arrays
@@ -118,7 +118,7 @@ class Agent:
             request, scan_error = self._scan_or_reason(encoded, options.up)
         estimate, record, pose_error = pose
         timings = _timings(clock, encoded, estimate)
-        answer = Answer(outcome, category_id, frame, decision, record, pose_error, scan_error, timings, evidence(burst, encoded))
+        answer = Answer(outcome, category_id, frame, decision, record, pose_error, scan_error, timings, grounds(burst, encoded))
         joins = None
         if options.learn and category_id is not None:
             joins = Joins(category_id, encoded, decision.similarities[0][1] if decision else None, "decision" if decision else "named")

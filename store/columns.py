@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from core.affine9 import Affine9
 from core.boxes import OrientedBox
-from core.evidence import Evidence
+from core.grounds import Grounds
 from core.novelty import Decision
 from core.quality import ViewFault
 from core.scan import ScanRequest
@@ -123,16 +123,16 @@ def pose_from_json(text: str) -> Pose:
     )
 
 
-def evidence_to_json(evidence: Evidence) -> str:
+def grounds_to_json(grounds: Grounds) -> str:
     """One TEXT column."""
-    return json.dumps(asdict(evidence))
+    return json.dumps(asdict(grounds))
 
 
-def evidence_from_json(text: str) -> Evidence:
-    """The inverse of `evidence_to_json`."""
+def grounds_from_json(text: str) -> Grounds:
+    """The inverse of `grounds_to_json`."""
     fields = json.loads(text)
     faults = tuple(tuple(ViewFault(**fault) for fault in view) for view in fields.pop("faults"))
-    return Evidence(**fields, faults=faults)
+    return Grounds(**fields, faults=faults)
 
 
 def _affine9(transform: Affine9) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from sqlite_utils import Database
 
 from core.encode import EncodedBurst
 from core.errors import NotFound
-from core.evidence import Evidence
+from core.grounds import Grounds
 from core.novelty import Decision
 from core.scan import ScanRequest
 from core.views import Burst, View
@@ -20,10 +20,10 @@ from store.bursts import read_view, write_burst
 from store.columns import (
     decision_from_json,
     decision_to_json,
-    evidence_from_json,
-    evidence_to_json,
     files_from_json,
     files_to_json,
+    grounds_from_json,
+    grounds_to_json,
     pose_from_json,
     pose_to_json,
 )
@@ -53,7 +53,7 @@ class Answer:
     pose_error: str | None
     scan_error: str | None
     timings_ms: Mapping[str, float]
-    evidence: Evidence | None = None
+    grounds: Grounds | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,7 +186,7 @@ def _row(observation_id: str, answer: Answer, views: int, files: Files) -> Row:
         "timings_ms": json.dumps(dict(answer.timings_ms)),
         "features_sha256": arrays_file(files)[1].sha256,
         "files": files_to_json(files),
-        "evidence": evidence_to_json(answer.evidence) if answer.evidence else None,
+        "grounds": grounds_to_json(answer.grounds) if answer.grounds else None,
     }
 
 
@@ -205,5 +205,5 @@ def _observation(row: Row) -> Observation:
         row["scan_error"],
         json.loads(row["timings_ms"]),
         row["features_sha256"],
-        evidence_from_json(row["evidence"]) if row["evidence"] else None,
+        grounds_from_json(row["grounds"]) if row["grounds"] else None,
     )

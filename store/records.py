@@ -10,7 +10,7 @@ import numpy as np
 
 from core.affine9 import Affine9
 from core.boxes import OrientedBox
-from core.evidence import Evidence
+from core.grounds import Grounds
 from core.novelty import Decision
 from core.scan import ScanRequest
 from core.sim3 import Sim3
@@ -178,5 +178,5 @@ class Observation:
     """Why a novel object has no scan."""
     timings_ms: dict[str, float]
     features_sha256: str
-    evidence: Evidence | None
+    grounds: Grounds | None
     """How much the answer rests on; None where an earlier version did not record it."""

@@ -177,9 +177,9 @@ def m002_years(db: Database) -> None:
 
 
 @migrations()
-def m003_evidence(db: Database) -> None:
+def m003_grounds(db: Database) -> None:
     """How much each observation's answer rests on."""
-    db.table("observations").add_column("evidence", str)
+    db.table("observations").add_column("grounds", str)
 
 
 def _reference(table: str, column: str, other_table: str, on_delete: str) -> ForeignKey:

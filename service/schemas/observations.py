@@ -17,7 +17,7 @@ from core.views import FloatArray
 from service.agent import ObserveOptions
 from service.schemas import scans
 from service.schemas.geometry import Box, Direction, Matrix4, Quaternion, Similarity, Stretch, as_up
-from service.schemas.quality import Evidence
+from service.schemas.quality import Grounds
 from store import records
 
 PixelBox = Annotated[list[float], Field(min_length=4, max_length=4)]
@@ -177,7 +177,7 @@ class Observation(BaseModel):
     pose_error: str | None = Field(description="Why a known object has no pose.")
     scan: scans.Scan | None = Field(description="Of a novel object: the views to take so that it becomes a category.")
     scan_error: str | None = Field(description="Why a novel object has no scan.")
-    evidence: Evidence | None = Field(description="How much the answer rests on; null where an earlier version did not record it.")
+    grounds: Grounds | None = Field(description="How much the answer rests on; null where an earlier version did not record it.")
     timings_ms: dict[str, float] = Field(description="Milliseconds of each stage, and their `total`.")
     debug: Debug | None = Field(None, description="Where `include=debug` asked for it.")
 
@@ -206,7 +206,7 @@ class Observation(BaseModel):
             pose_error=observation.pose_error,
             scan=scan,
             scan_error=observation.scan_error,
-            evidence=Evidence.of(observation.evidence) if observation.evidence else None,
+            grounds=Grounds.of(observation.grounds) if observation.grounds else None,
             timings_ms=observation.timings_ms,
             debug=debug,
         )

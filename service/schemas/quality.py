@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from pydantic import BaseModel, Field
 
-from core import evidence, quality
+from core import grounds, quality
 
 
 class Fault(BaseModel):
@@ -21,7 +21,7 @@ class Fault(BaseModel):
         return [Fault(kind=fault.kind, detail=fault.detail) for fault in faults]
 
 
-class Evidence(BaseModel):
+class Grounds(BaseModel):
     """How much an answer rests on."""
 
     views: int = Field(examples=[5])
@@ -34,9 +34,9 @@ class Evidence(BaseModel):
     faults: list[list[Fault]] = Field(description="What is wrong with each view.")
 
     @staticmethod
-    def of(found: evidence.Evidence) -> Evidence:
+    def of(found: grounds.Grounds) -> Grounds:
         """From core's type."""
-        return Evidence(
+        return Grounds(
             views=found.views,
             shown=found.shown,
             with_depth=found.with_depth,

@@ -15,7 +15,7 @@ ONE_SIDE_DEG = 20.0
 
 
 @dataclass(frozen=True)
-class Evidence:
+class Grounds:
     """What a burst shows of its object."""
 
     views: int
@@ -38,11 +38,11 @@ class Evidence:
         return None
 
 
-def evidence(burst: Burst, encoded: EncodedBurst) -> Evidence:
+def grounds(burst: Burst, encoded: EncodedBurst) -> Grounds:
     """Of a burst and its encoding."""
     shown = [view for view in encoded.views if len(view.cells)]
     found = tuple(faults(view, region_of_encoded(seen)) for view, seen in zip(burst.views, encoded.views))
-    return Evidence(len(burst), len(shown), sum(bool(view.trusted.any()) for view in shown), _spread_deg(encoded), found)
+    return Grounds(len(burst), len(shown), sum(bool(view.trusted.any()) for view in shown), _spread_deg(encoded), found)
 
 
 def _spread_deg(encoded: EncodedBurst) -> float | None:
