@@ -127,9 +127,7 @@ def _of_file(connection: Connection, table: str, row: Row, name: str, wrong: str
         if category["removed_by"] is not None:
             consequence = "it is deleted or merged; undoing that brings it back damaged"
         elif name.endswith(".npz"):
-            consequence = (
-                "it has no poses; it is still recognised, and every other category works; import it again, restore it, or delete it"
-            )
+            consequence = "it gets no poses, but is recognised, and every other category works; restore, reembed or delete it"
         else:
             consequence = "this picture, and computing the category anew with another backbone; it is still recognised and has poses"
     elif kind == "observation":

@@ -85,11 +85,16 @@ class Memory:
 
         Changing it raises Unavailable. Raises NotFound where there is none, Conflict where a process of another version has it open.
         """
-        if not (folder / DATABASE).is_file():
-            raise NotFound(f"no memory is in {folder}; name its folder, or set ONELOOK_DATA_DIR")
+        cls.require(folder)
         if outdated(folder / DATABASE):
             cls.open(folder).close()
         return cls(Connection(folder, only_read=True), None)
+
+    @staticmethod
+    def require(folder: Path) -> None:
+        """Raises NotFound where no memory is in `folder`."""
+        if not (folder / DATABASE).is_file():
+            raise NotFound(f"no memory is in {folder}; name its folder, or set ONELOOK_DATA_DIR")
 
     @property
     def version(self) -> int:

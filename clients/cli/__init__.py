@@ -10,7 +10,7 @@ from typing import Any
 import typer
 from typer.core import TyperGroup
 
-from clients.cli import bench, data, demo, memory, render, robot, service
+from clients.cli import bench, categories, data, demo, memory, render, robot, service
 from clients.cli.terminal import errors
 from core.errors import OneLookError
 
@@ -50,8 +50,8 @@ app = typer.Typer(
 app.command("serve", cls=service.ServeCommand)(service.serve)
 app.command("observe")(robot.observe)
 app.command("scan")(robot.scan)
-app.add_typer(memory.app, name="categories")
-app.command("memory")(memory.show_memory)
+app.add_typer(categories.app, name="categories")
+app.add_typer(memory.app, name="memory")
 app.command("simulate")(demo.simulate)
 app.command("render")(render.render)
 app.command("samples")(data.samples)

@@ -1,82 +1,193 @@
-"""`onelook categories` and `onelook memory`: what the service has learnt."""
+"""`onelook memory`: what the service says of its memory, and the memory's folder itself, also while the service has it open."""
 
 from __future__ import annotations
 
 from dataclasses import asdict
-from typing import Annotated
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from clients.answers import Category
-from clients.cli.terminal import URL, Json, Url, console, print_facts, print_json, print_table
-from clients.errors import ClientError
+from clients.cli.categories import find
+from clients.cli.service import read_settings
+from clients.cli.terminal import URL, Json, Url, console, errors, print_facts, print_json, print_table, progress_of
 from clients.robot import RobotClient
 
-app = typer.Typer(help="List, rename or forget the categories of the memory.")
+if TYPE_CHECKING:
+    from store.check import Damage
 
-Which = Annotated[str, typer.Argument(help="The category's name, its id, or the id's first characters.")]
+app = typer.Typer(help="Inspect, check, back up, export, import or recompute a memory.")
+
+DataDir = Annotated[Path | None, typer.Option(help="Folder of the memory; ONELOOK_DATA_DIR where left out.", show_default=False)]
+Chosen = Annotated[list[str] | None, typer.Option("--category", help="Name, id or its first characters; repeat it for several.")]
 
 
 @app.callback(invoke_without_command=True)
-def categories(context: typer.Context, url: Url = URL, json: Json = False) -> None:
-    """List the categories of the memory, or rename or forget one."""
-    if context.invoked_subcommand is None:
-        list_categories(url, json)
+def memory(context: typer.Context, url: Url = URL, json: Json = False) -> None:
+    """Show what the service says of its memory, or work on a memory's folder."""
+    if context.invoked_subcommand is not None:
+        return
+    with RobotClient(url) as robot:
+        facts = asdict(robot.info())
+    if json:
+        print_json(facts)
+    else:
+        print_facts(facts)
+
+
+@app.command()
+def info(data_dir: DataDir = None, json: Json = False) -> None:
+    """Show how much is in the folder and what it was made with."""
+    from store.memory import Memory
+
+    with Memory.reading(_folder(data_dir)) as stored:
+        facts = {"folder": str(stored.folder), "backbone": stored.backbone, "fingerprint": stored.fingerprint}
+        facts |= {"memory_version": stored.version} | asdict(stored.sizes())
+    if json:
+        print_json(facts)
+    else:
+        print_facts(facts | {"size": _megabytes(facts["size"])})
 
 
 @app.command("list")
-def list_categories(url: Url = URL, json: Json = False) -> None:
-    """List the categories, oldest first."""
-    with RobotClient(url) as robot:
-        categories = robot.categories()
+def list_categories(data_dir: DataDir = None, json: Json = False) -> None:
+    """List the categories in the folder, oldest first."""
+    from store.memory import Memory
+
+    with Memory.reading(_folder(data_dir)) as stored:
+        categories = [asdict(category) for category in stored.categories.all()]
     if json:
-        print_json([asdict(category) for category in categories])
-    else:
-        print_table([_row(category) for category in categories], "The memory is empty; `onelook scan FOLDER` teaches it a category.")
+        print_json(categories)
+        return
+    rows = [
+        {"id": each["id"][:8], "name": each["name"] or "–"} | {key: str(each[key]) for key in ("views", "instances")} for each in categories
+    ]
+    print_table(rows, "The memory is empty.")
 
 
 @app.command()
-def rename(category: Which, name: Annotated[str, typer.Argument(help="What people call it.")], url: Url = URL) -> None:
-    """Give a category a name."""
-    with RobotClient(url) as robot:
-        renamed = robot.rename(find(robot.categories(), category).id, name)
-    console.print(f"{renamed.id} is called {renamed.name}")
+def check(data_dir: DataDir = None, json: Json = False) -> None:
+    """Read everything, name what is damaged and what still works; exits with 1 where anything is."""
+    from store.memory import Memory
+
+    with Memory.reading(_folder(data_dir)) as stored, progress_of("checking") as progress:
+        report = stored.check(progress)
+    if json:
+        print_json(asdict(report) | {"ok": report.ok})
+    else:
+        _print_damages(report.damages)
+        console.print(f"{report.categories} categories, {report.files} files, {_megabytes(report.size)}: {_verdict(report.damages)}")
+    if not report.ok:
+        raise typer.Exit(1)
 
 
 @app.command()
-def forget(category: Which, url: Url = URL) -> None:
-    """Delete a category and all that was learnt with it."""
-    with RobotClient(url) as robot:
-        forgotten = find(robot.categories(), category)
-        robot.forget(forgotten.id)
-    console.print(f"forgot {forgotten.name or forgotten.id}")
+def backup(
+    folder: Annotated[Path, typer.Argument(help="Folder to make; it opens as a memory.")], data_dir: DataDir = None, json: Json = False
+) -> None:
+    """Copy the whole memory to a new folder, and read the copy once."""
+    from store.memory import Memory
 
-
-def show_memory(url: Url = URL, json: Json = False) -> None:
-    """Show the memory's size and what it was made with."""
-    with RobotClient(url) as robot:
-        info = asdict(robot.info())
+    with Memory.reading(_folder(data_dir)) as stored, progress_of("copying") as progress:
+        done = stored.backup(folder, progress)
     if json:
-        print_json(info)
+        print_json(asdict(done) | {"folder": str(done.folder)})
     else:
-        print_facts(info)
+        _print_damages(done.damages)
+        console.print(f"{done.folder}: {done.files} files, {_megabytes(done.size)}: {_verdict(done.damages)}")
 
 
-def find(categories: list[Category], which: str) -> Category:
-    """The category that `which` names or whose id starts with it. Raises ClientError unless it is exactly one."""
-    found = [each for each in categories if each.name == which] or [each for each in categories if each.id.startswith(which)]
-    if len(found) != 1:
-        problem = "no category is" if not found else f"{len(found)} categories are"
-        raise ClientError(f"{problem} called {which!r} or has an id that starts so; `onelook categories list` shows them")
-    return found[0]
+@app.command("export")
+def export_categories(
+    file: Annotated[Path, typer.Argument(help="File to make, such as cups.zip.")],
+    category: Chosen = None,
+    data_dir: DataDir = None,
+    json: Json = False,
+) -> None:
+    """Write categories, all where none are named, to one file for another robot's memory."""
+    from store.memory import Memory
+
+    with Memory.reading(_folder(data_dir)) as stored, progress_of("exporting") as progress:
+        known = stored.categories.all()
+        done = stored.export(file, [find(known, which).id for which in category] if category else None, progress)
+    if json:
+        print_json(asdict(done) | {"path": str(done.path)})
+    else:
+        console.print(f"{done.path}: {done.categories} categories, {_megabytes(done.size)}")
 
 
-def _row(category: Category) -> dict[str, str]:
-    return {
-        "id": category.id[:8],
-        "name": category.name or "–",
-        "views": str(category.views),
-        "instances": str(category.instances),
-        "size": " × ".join(f"{100 * edge:.0f}" for edge in category.extent_m) + " cm",
-        "learnt": category.created_at[:19].replace("T", " "),
-    }
+@app.command("import")
+def import_categories(
+    file: Annotated[Path, typer.Argument(help="What `onelook memory export` wrote.")], data_dir: DataDir = None, json: Json = False
+) -> None:
+    """Take the categories of another memory; those that are there already stay as they are. The service must not run on the folder."""
+    from store.memory import Memory
+
+    with Memory.open(_folder(data_dir)) as stored, progress_of("importing") as progress:
+        done = stored.import_archive(file, actor="onelook memory import", progress=progress)
+    if json:
+        print_json(asdict(done))
+        return
+    for each in done.categories:
+        also = f"; {len(each.same_name)} had this name already" if each.same_name else ""
+        console.print(f"{each.name or '–'} is {each.id[:8]} here, with {each.instances} instances and {each.goals} goals{also}")
+    for twin in done.duplicates:
+        console.print(f"{twin.name or '–'} was here already as {twin.id[:8]}")
+
+
+@app.command()
+def reembed(
+    backbone: Annotated[str | None, typer.Option(help="The new backbone; ONELOOK_BACKBONE where left out.", show_default=False)] = None,
+    device: Annotated[str | None, typer.Option(help="Torch device; ONELOOK_DEVICE where left out.", show_default=False)] = None,
+    data_dir: DataDir = None,
+    json: Json = False,
+) -> None:
+    """Compute the memory anew from its views, with another backbone or again with the same. The service must not run on the folder."""
+    from core.backbones.dino import load_backbone
+    from service.features import features_as_arrays
+    from store.memory import Memory
+
+    settings = read_settings({})
+    with Memory.open(_existing(data_dir)) as stored:
+        loaded = load_backbone(backbone or settings.backbone, device=device or settings.device, report=errors.print)
+        with progress_of("computing") as progress:
+            done = stored.reembed(
+                loaded, lambda encoded: features_as_arrays(encoded, None), actor="onelook memory reembed", progress=progress
+            )
+    if json:
+        print_json(asdict(done) | {"backbone": loaded.name, "fingerprint": loaded.fingerprint})
+    else:
+        print_facts({"backbone": loaded.name, "fingerprint": loaded.fingerprint} | asdict(done))
+
+
+def _row(category: dict[str, Any]) -> dict[str, str]:
+    shown = {"id": category["id"][:8], "name": category["name"] or "–"}
+    return shown | {key: str(category[key]) for key in ("views", "instances", "created_at")}
+
+
+def _folder(data_dir: Path | None) -> Path:
+    return data_dir or read_settings({}).data_dir
+
+
+def _existing(data_dir: Path | None) -> Path:
+    """The same; raises NotFound where no memory is in it."""
+    from store.memory import Memory
+
+    folder = _folder(data_dir)
+    Memory.require(folder)
+    return folder
+
+
+def _print_damages(damages: tuple[Damage, ...]) -> None:
+    for damage in damages:
+        called = f"{damage.kind} {damage.name or damage.id or ''}".strip()
+        console.print(f"[bold red]{called}[/]: {damage.file}: {damage.problem}. {damage.consequence}", soft_wrap=True)
+
+
+def _verdict(damages: tuple[Damage, ...]) -> str:
+    return f"{len(damages)} damaged" if damages else "everything is what was written"
+
+
+def _megabytes(size: object) -> str:
+    assert isinstance(size, int)
+    return f"{size / 1e6:.1f} MB"

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from clients.cli.memory import find
+from clients.cli.categories import find
 from clients.cli.terminal import URL, Folder, Json, Url, console, print_facts, print_json
 from clients.errors import ClientError
 from clients.robot import Observation, RobotClient

@@ -54,7 +54,7 @@ def serve(
     from service.app import checked_backbone, create_app
 
     given = {"host": host, "port": port, "data_dir": data_dir, "backbone": backbone, "device": device, "threshold": threshold}
-    settings = _settings({name: value for name, value in given.items() if value is not None})
+    settings = read_settings({name: value for name, value in given.items() if value is not None})
     logging.config.dictConfig(_log_config())
     with _bound(settings.host, settings.port) as listener:
         # Opened once before uvicorn starts, which would wrap the sentence that says what is wrong in a traceback.
@@ -65,7 +65,7 @@ def serve(
             server.run(sockets=[listener])
 
 
-def _settings(given: dict[str, object]) -> Settings:
+def read_settings(given: dict[str, object]) -> Settings:
     """The options given, the environment for the rest. Raises InvalidInput."""
     from pydantic import ValidationError
 

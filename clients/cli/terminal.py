@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, TypeVar
 
 import typer
 from rich.console import Console
-from rich.progress import track
+from rich.progress import Progress, track
 from rich.table import Table
 
 from clients.robot import DEFAULT_URL
@@ -30,6 +31,15 @@ URL = DEFAULT_URL
 def progress_bar(items: Iterable[T], doing: str, total: int) -> Iterator[T]:
     """The items, with a bar on a terminal's standard error: standard output stays what other programs read."""
     yield from track(items, doing, total, console=errors, transient=True, disable=not errors.is_terminal)
+
+
+@contextmanager
+def progress_of(doing: str) -> Iterator[Callable[[int, int], None]]:
+    """A bar as in `progress_bar`, for work that tells itself how much of how much is done."""
+    bar = Progress(*Progress.get_default_columns(), console=errors, transient=True, disable=not errors.is_terminal)
+    with bar:
+        task = bar.add_task(doing, total=None)
+        yield lambda done, total: bar.update(task, completed=done, total=total)
 
 
 def print_json(value: object) -> None:
