@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from core.boxes import OrientedBox, oriented_box, remove_outliers
+from core.boxes import OrientedBox, oriented_box, remove_outliers, remove_support
 from core.descriptors import PcaBasis
 from core.encode import EncodedBurst, EncodedView
 from core.errors import TooFewViews
@@ -29,7 +29,7 @@ class Reference:
     views: tuple[EncodedView, ...]
     basis: PcaBasis
     cloud_m: NDArray[np.float32]
-    """Object points without outliers, shape (N, 3)."""
+    """Object points without support and outliers, shape (N, 3)."""
     box: OrientedBox
     symmetries: NDArray[np.floating]
     """Rotations about the box's centre that map the object onto itself, identity left out, shape (S, 3, 3)."""
@@ -65,6 +65,7 @@ def build_reference(encoded: EncodedBurst) -> Reference:
         raise TooFewViews(
             "views", f"a reference needs at least {MIN_VIEWS} views that show the object with depth and camera, found {len(shown)}"
         )
-    cloud = remove_outliers(encoded.cloud_m).astype(np.float32)
+    cameras = np.stack([view.camera.world_from_camera[:3, 3] for view in shown if view.camera is not None])
+    cloud = remove_outliers(remove_support(encoded.cloud_m, cameras)).astype(np.float32)
     basis = PcaBasis.fit(np.concatenate([view.descriptors for view in encoded.views]))
     return Reference(encoded.views, basis, cloud, oriented_box(cloud), np.zeros((0, 3, 3)), encoded.fingerprint)
