@@ -109,13 +109,13 @@ def _database(connection: Connection) -> list[Damage]:
 
 
 def _instances(connection: Connection) -> list[Damage]:
-    columns = ", ".join(f"i.{name}" for name in ("id", *TOKENS, "tokens_sha256"))
-    rows = connection.rows(
-        f"SELECT {columns}, c.name FROM instances i JOIN categories c ON c.id = i.category_id WHERE i.removed_by IS NULL"
-    )
+    columns = ", ".join(("id", *TOKENS, "tokens_sha256"))
+    found = []
+    for category in connection.rows("SELECT id, name FROM categories"):  # one at a time: tokens of all are much
+        rows = connection.rows(f"SELECT {columns} FROM instances WHERE category_id = ? AND removed_by IS NULL", category["id"])
+        found += [(row["id"], category["name"]) for row in rows if damaged(row)]
     consequence = "it is left out of the decision; its category is recognised by its other instances, if it has any"
-    problem = "its tokens are not what was written"
-    return [Damage("instance", row["id"], row["name"], DATABASE, problem, consequence) for row in rows if damaged(row)]
+    return [Damage("instance", each, name, DATABASE, "its tokens are not what was written", consequence) for each, name in found]
 
 
 def _of_file(connection: Connection, table: str, row: Row, name: str, wrong: str) -> Damage:

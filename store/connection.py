@@ -47,7 +47,7 @@ class Connection:
             self._db.execute("PRAGMA foreign_keys = ON")
             upgrade(self._db)
             self._db.execute(f"PRAGMA query_only = {int(only_read)}")
-        except sqlite3.Error as error:
+        except (sqlite3.Error, UnicodeDecodeError) as error:  # SQLite quotes the damage, which need not be text
             self._db.close()
             raise Unavailable(f"{root / DATABASE} is no usable database: {error}; restore it from a backup") from error
         except BaseException:
@@ -90,7 +90,9 @@ class Connection:
                 yield self._db
         except sqlite3.IntegrityError as error:
             raise Conflict("a category, scan or observation that this needs was deleted meanwhile; send the request again") from error
-        except sqlite3.OperationalError as error:
+        except sqlite3.ProgrammingError:
+            raise
+        except sqlite3.DatabaseError as error:
             raise self._unwritable(error) from error
 
     def create(

@@ -31,7 +31,7 @@ def outdated(database: Path) -> bool:
     try:
         with Database(sqlite3.connect(database)) as db:
             return bool(migrations.pending(db))
-    except sqlite3.Error:  # whoever opens it says what is wrong with it
+    except (sqlite3.Error, UnicodeDecodeError):  # whoever opens it says what is wrong with it
         return False
 
 

@@ -79,6 +79,19 @@ def test_a_file_that_is_no_database_is_named(folder: Path) -> None:
         Memory.open(folder)
 
 
+@pytest.mark.parametrize("where", [0.02, 0.3, 0.6, 0.9])
+def test_a_torn_database_is_one_sentence(folder: Path, reference: Reference, burst: Burst, encoded: EncodedBurst, where: float) -> None:
+    with Memory.open(folder) as memory:
+        memory.categories.create(reference, burst, encoded)
+    database = folder / "memory.sqlite3"
+    content = database.read_bytes()
+    database.write_bytes(content[: int(where * len(content))])
+    with pytest.raises(Unavailable, match="restore it from a backup"):
+        Memory.open(folder)
+    with pytest.raises(Unavailable, match="restore it from a backup"):
+        Memory.reading(folder)
+
+
 def test_half_written_folders_are_removed_at_the_start(
     folder: Path, reference: Reference, burst: Burst, encoded: EncodedBurst, request_for_views: ScanRequest
 ) -> None:
