@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Generic, Literal, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from core.sim3 import Sim3
 from core.views import FloatArray
@@ -17,6 +18,21 @@ from core.views import FloatArray
 Outcome = Literal["known", "uncertain", "novel"]
 S = TypeVar("S")
 R = TypeVar("R")
+
+
+@dataclass(frozen=True, eq=False)
+class Alternative:
+    """Another transform that was considered."""
+
+    target_from_reference: Sim3
+    score: float
+    """To be compared with the pose's."""
+    confidence: float | None
+
+    @staticmethod
+    def from_json(fields: Mapping[str, Any]) -> Alternative:
+        """From the service's answer."""
+        return Alternative(sim3_from_json(fields["target_from_reference"]), fields["score"], fields["confidence"])
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +53,11 @@ class Pose:
     """The burst's view in which most correspondences agree; its pictures tell most."""
     residual_m: float
     score: float | None
+    """How well both objects agree, in [0, 1], where the variant computes it."""
     confidence: float | None
+    """Probability that the rotation is within 30°, where the variant estimates one."""
+    alternatives: tuple[Alternative, ...]
+    """Other transforms that were considered, best first."""
 
     @property
     def matrix(self) -> FloatArray:
@@ -63,7 +83,7 @@ class Pose:
     def from_json(fields: Mapping[str, Any]) -> Pose:
         """From the service's answer."""
         return Pose(
-            Sim3.from_matrix(np.array(fields["target_from_reference"]["matrix"])),
+            sim3_from_json(fields["target_from_reference"]),
             np.array(fields["world_from_object"]),
             np.array(fields["box"]["extent_m"]),
             np.array(fields["box"]["corners_m"]),
@@ -73,6 +93,7 @@ class Pose:
             fields["residual_m"],
             fields["score"],
             fields["confidence"],
+            tuple(Alternative.from_json(each) for each in fields["alternatives"]),
         )
 
 
@@ -83,6 +104,11 @@ class CategorySimilarity:
     category_id: str
     name: str | None
     similarity: float
+
+    @staticmethod
+    def from_json(fields: Mapping[str, Any]) -> CategorySimilarity:
+        """From the service's answer."""
+        return CategorySimilarity(fields["category_id"], fields["name"], fields["similarity"])
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,8 +123,14 @@ class ScanRequest:
     radius_m: float
     world_from_camera: FloatArray
     """Camera poses, shape (n, 4, 4), metres, OpenCV axes; near ones will do."""
+    extent_m: float
+    """The object's diameter as far as it was seen."""
+    covered: NDArray[np.bool_]
+    """Of each viewpoint whether a view was taken near it, shape (n,)."""
     views: int
     """Views received so far; of a completed scan 0."""
+    faults: tuple[tuple[str, ...], ...]
+    """Of each of them what is wrong with it, in words."""
     views_required: int
     """Fewest views that make a category."""
 
@@ -111,7 +143,10 @@ class ScanRequest:
             np.array(fields["up"]),
             fields["radius_m"],
             np.array(fields["world_from_camera"]),
+            fields["extent_m"],
+            np.array(fields["covered"], dtype=bool),
             fields["views"],
+            tuple(tuple(fault["detail"] for fault in view["faults"]) for view in fields["received"]),
             fields["views_required"],
         )
 
@@ -217,10 +252,13 @@ class Observation(Generic[S]):
             pose_error=fields["pose_error"],
             scan=ScanRequest.from_json(fields["scan"]) if fields["scan"] else None,
             scan_error=fields["scan_error"],
-            similarities=tuple(
-                CategorySimilarity(each["category_id"], each["name"], each["similarity"]) for each in fields["similarities"]
-            ),
+            similarities=tuple(CategorySimilarity.from_json(each) for each in fields["similarities"]),
             threshold=fields["threshold"],
             timings_ms=fields["timings_ms"],
             raw=fields,
         )
+
+
+def sim3_from_json(fields: Mapping[str, Any]) -> Sim3:
+    """A similarity of an answer."""
+    return Sim3.from_matrix(np.array(fields["matrix"]))

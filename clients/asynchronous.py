@@ -12,15 +12,15 @@ from __future__ import annotations
 
 import asyncio
 import functools
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable, Coroutine, Sequence
 from types import TracebackType
 from typing import Any, Concatenate, ParamSpec, TypeVar
 
 import httpx
 
-from clients import calls
 from clients.answers import Category, Observation, ScanRequest, Viewpoints
-from clients.calls import Call
+from clients.calls import curating, observing, operating, rearranging, scanning
+from clients.calls.call import Call
 from clients.exchange import Retry, Wait, exchange
 from clients.robot import DEFAULT_URL, TIMEOUT_S, timeouts, with_self
 from core.views import Burst, View
@@ -66,13 +66,21 @@ class AsyncScan(Viewpoints):
         super().__init__(request)
         self._robot = robot
 
-    async def add(self, view: View) -> None:
-        """Sends one view; its camera says where it was really taken from, in the burst's world frame."""
-        self.request = await self._robot.send(calls.add_views(self.id, Burst([view])))
+    async def add(self, view: View) -> tuple[str, ...]:
+        """Sends one view; its camera says where it was really taken from, in the burst's world frame.
+
+        Returns what is wrong with it, in words: better send another one from there.
+        """
+        self.request = await self._robot.send(scanning.add_views(self.id, Burst([view])))
+        return self.request.faults[-1]
+
+    async def exclude(self, viewpoints: Sequence[int]) -> None:
+        """Has viewpoints that the robot cannot reach, given by their places, replaced by other ones: iterate again."""
+        self.request = await self._robot.send(scanning.exclude_viewpoints(self.id, viewpoints))
 
     async def complete(self, name: str | None = None) -> Category:
         """Makes the views a category, in one step."""
-        return await self._robot.send(calls.complete_scan(self.id, name))
+        return await self._robot.send(scanning.complete_scan(self.id, name))
 
 
 class AsyncRobotClient:
@@ -115,15 +123,26 @@ class AsyncRobotClient:
         except httpx.TransportError as error:
             return error
 
-    observe = _method(calls.observe, _observation)
-    observation = _method(calls.observation, _observation)
-    observations = _method(calls.observations, _observations)
-    scan = _method(calls.scan, _scan)
-    open_scan = _method(calls.open_scan, _scan)
-    forget_scan = _method(calls.forget_scan, _as_is)
-    categories = _method(calls.categories, _as_is)
-    category = _method(calls.category, _as_is)
-    rename = _method(calls.rename, _as_is)
-    forget = _method(calls.forget, _as_is)
-    info = _method(calls.info, _as_is)
-    picture = _method(calls.picture, _as_is)
+    observe = _method(observing.observe, _observation)
+    observation = _method(observing.observation, _observation)
+    observations = _method(observing.observations, _observations)
+    picture = _method(observing.picture, _as_is)
+    scan = _method(scanning.scan, _scan)
+    open_scan = _method(scanning.open_scan, _scan)
+    forget_scan = _method(scanning.forget_scan, _as_is)
+    categories = _method(curating.categories, _as_is)
+    category = _method(curating.category, _as_is)
+    rename = _method(curating.rename, _as_is)
+    forget = _method(curating.forget, _as_is)
+    merge = _method(curating.merge, _as_is)
+    split = _method(curating.split, _as_is)
+    instances = _method(curating.instances, _as_is)
+    forget_instance = _method(curating.forget_instance, _as_is)
+    similarities = _method(curating.similarities, _as_is)
+    cloud = _method(curating.cloud, _as_is)
+    set_goal = _method(rearranging.set_goal, _as_is)
+    goals = _method(rearranging.goals, _as_is)
+    goal = _method(rearranging.goal, _as_is)
+    forget_goal = _method(rearranging.forget_goal, _as_is)
+    plan = _method(rearranging.plan, _as_is)
+    info = _method(operating.info, _as_is)

@@ -11,7 +11,8 @@ OneLookError
         ├── NoPoseProblem
         ├── NotFoundProblem
         ├── ConflictProblem
-        └── UnavailableProblem
+        ├── UnavailableProblem
+        └── UnexpectedProblem
 """
 
 from __future__ import annotations
@@ -77,6 +78,10 @@ class UnavailableProblem(ServiceProblem):
     """Something the service needs is missing or busy."""
 
 
+class UnexpectedProblem(ServiceProblem):
+    """The service failed in a way it did not expect; its log says where."""
+
+
 PROBLEMS: Mapping[str, type[ServiceProblem]] = {
     f"{PROBLEM_URN}{name}": kind
     for name, kind in {
@@ -87,6 +92,7 @@ PROBLEMS: Mapping[str, type[ServiceProblem]] = {
         "not-found": NotFoundProblem,
         "conflict": ConflictProblem,
         "unavailable": UnavailableProblem,
+        "unexpected": UnexpectedProblem,
     }.items()
 }
 

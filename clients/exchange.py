@@ -19,7 +19,7 @@ from typing import Any, TypeVar
 
 import httpx
 
-from clients.calls import Call
+from clients.calls.call import Call
 from clients.errors import ServiceProblem, TooSlow, Unreachable, problem_from_json
 
 T = TypeVar("T")

@@ -22,6 +22,9 @@ SCAN = {
     "up": [0, 0, 1],
     "radius_m": 1,
     "world_from_camera": [np.eye(4).tolist()],
+    "extent_m": 0.2,
+    "covered": [False],
+    "received": [],
     "views": 1,
     "views_required": 2,
 }

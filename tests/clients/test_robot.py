@@ -14,7 +14,7 @@ from clients.datasets.folders import Sequence, load_burst
 from clients.exchange import Retry
 from clients.robot import RobotClient
 from clients.simulator.replay import ReplayWorld
-from core.errors import InvalidInput
+from core.errors import InvalidInput, OneLookError
 
 
 def answering(handler: httpx.MockTransport) -> RobotClient:
@@ -101,9 +101,10 @@ def test_every_problem_type_has_its_exception(name: str, kind: type[errors.Servi
 
 
 def test_the_service_names_problems_as_the_client_does() -> None:
-    from service.errors import KINDS
+    from service.errors import KINDS, problem_of
 
-    assert {f"{errors.PROBLEM_URN}{name}" for _, _, name, _ in KINDS} == set(errors.PROBLEMS)
+    unexpected = problem_of(OneLookError("of no kind that has a status")).type
+    assert {f"{errors.PROBLEM_URN}{name}" for _, _, name, _ in KINDS} | {unexpected} == set(errors.PROBLEMS)
 
 
 def test_a_wrong_field_of_a_real_burst_is_named(robot: RobotClient, samples: list[Sequence]) -> None:
