@@ -118,8 +118,19 @@ def run(data: Path, sweep: Sweep, limit: int | None, json: Path | None, seed: in
 
     Raises InvalidInput for a setting that does not exist, or data without pairs, ground truth or enough views.
     """
+    rows, meta = measure(data, [sweep], limit, seed, backbone)
+    if json is not None:
+        write_json(json, meta, [asdict(row) for row in rows])
+    differing = [name for name in OPTIONS if len({(row.variant, getattr(row, name)) for row in rows}) > len(set(sweep.variants))]
+    hidden = {*OPTIONS, *(name for name in TRANSLATION if all(getattr(row, name) is None for row in rows))}
+    print_table(f"Pose, {data}", [asdict(row) for row in rows], [*(name for name in COLUMNS if name not in hidden), *differing])
+    return rows
+
+
+def measure(data: Path, sweeps: Sequence[Sweep], limit: int | None, seed: int, backbone: str) -> tuple[list[PoseRow], dict[str, object]]:
+    """The rows of every setting of `sweeps`, in order, and what they depend on besides. See `run`."""
     network = load_backbone(backbone)
-    settings = sweep.settings(network.dim)
+    settings = [setting for sweep in sweeps for setting in sweep.settings(network.dim)]
     pairs = sample_pairs(find_sequences(data), DEFAULT_LIMIT if limit is None else limit, seed)
     sequences = list(dict.fromkeys(sequence for pair in pairs for sequence in pair))
     _require_views(sequences, [setting.views for setting in settings])
@@ -128,26 +139,20 @@ def run(data: Path, sweep: Sweep, limit: int | None, json: Path | None, seed: in
     jobs = [job for setting in settings for job in _jobs(setting, pairs, files, seed)]
     started = time.perf_counter()
     results = map_jobs(solve, jobs, lambda job: len(job.targets), "solving")
-    seconds = time.perf_counter() - started
-    rows = [row for setting in settings for row in table_rows(setting, [result for result in results if result.job.setting == setting])]
-    if json is not None:
-        meta = {
-            "benchmark": "pose",
-            "data": data,
-            "seed": seed,
-            "limit": limit,
-            "backbone": network.name,
-            "fingerprint": network.fingerprint,
-            "options": asdict(sweep),
-            "solve_seconds": seconds,
-            "workers": worker_count(len(jobs)),
-            "threads_per_worker": 1,
-        }
-        write_json(json, meta, [asdict(row) for row in rows])
-    differing = [name for name in OPTIONS if len({(row.variant, getattr(row, name)) for row in rows}) > len(set(sweep.variants))]
-    hidden = {*OPTIONS, *(name for name in TRANSLATION if all(getattr(row, name) is None for row in rows))}
-    print_table(f"Pose, {data}", [asdict(row) for row in rows], [*(name for name in COLUMNS if name not in hidden), *differing])
-    return rows
+    meta = {
+        "benchmark": "pose",
+        "data": data,
+        "seed": seed,
+        "limit": limit,
+        "backbone": network.name,
+        "fingerprint": network.fingerprint,
+        "options": [asdict(sweep) for sweep in sweeps],
+        "solve_seconds": time.perf_counter() - started,
+        "workers": worker_count(len(jobs)),
+        "threads_per_worker": 1,
+    }
+    groups = [[result for result in results if result.job.setting == setting] for setting in settings]
+    return [row for setting, group in zip(settings, groups, strict=True) for row in table_rows(setting, group)], meta
 
 
 def solve(job: Job) -> JobResult:

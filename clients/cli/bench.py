@@ -42,6 +42,20 @@ def pose(
 
 
 @app.command()
+def paper(
+    data: Data,
+    limit: Annotated[int | None, typer.Option(min=1, help="Pairs a category at most.")] = None,
+    seed: Seed = 0,
+    backbone: Backbone = BACKBONE,
+    json: JsonFile = None,
+) -> None:
+    """The paper's tables 1 and 2, with every published row beside ours."""
+    from benchmarks.paper import run
+
+    run(data, limit, json, seed, backbone)
+
+
+@app.command()
 def discovery(
     data: Data,
     score: Annotated[list[str] | None, typer.Option(help="Score of the decision; may be repeated; all where left out.")] = None,
