@@ -30,6 +30,7 @@ from core.boxes import remove_outliers
 from core.encode import EncodedBurst, Encoder
 from core.errors import InvalidInput, NoPose
 from core.sim3 import Sim3
+from core.views import FloatArray
 
 DEFAULT_LIMIT = 30
 """Pairs a category."""
@@ -136,7 +137,8 @@ def measure(data: Path, sweeps: Sequence[Sweep], limit: int | None, seed: int, b
     _require_views(sequences, [setting.views for setting in settings])
     encoded = encode_all(sequences, Encoder(network))
     files = {sequence.key: file for sequence, file in zip(sequences, encoded, strict=True)}
-    jobs = [job for setting in settings for job in _jobs(setting, pairs, files, seed)]
+    by_setting = [_jobs(setting, pairs, files, seed) for setting in settings]
+    jobs = [job for jobs_of_reference in zip(*by_setting) for job in jobs_of_reference]  # what one has read serves the next
     started = time.perf_counter()
     results = map_jobs(solve, jobs, lambda job: len(job.targets), "solving")
     meta = {
@@ -268,5 +270,11 @@ def _score(found: Found | None, job: Job, sequence: folders.Sequence) -> tuple[P
 
 def _model_box(job: Job, sequence: folders.Sequence, world_from_model: Sim3) -> Parallelepiped:
     """Around all that was measured of an object, along its model's axes, in its world."""
-    cloud = remove_outliers(_cached(job.files[sequence.key]).cloud_m)
+    cloud = _measured(job.files[sequence.key])
     return Parallelepiped.around(world_from_model.inverse().apply(cloud)).carried_by(world_from_model.as_matrix())
+
+
+@lru_cache(maxsize=16)
+def _measured(file: Path) -> FloatArray:
+    """The cloud of all views without outliers."""
+    return remove_outliers(_cached(file).cloud_m)
