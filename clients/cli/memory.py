@@ -59,10 +59,7 @@ def list_categories(data_dir: DataDir = None, json: Json = False) -> None:
     if json:
         print_json(categories)
         return
-    rows = [
-        {"id": each["id"][:8], "name": each["name"] or "–"} | {key: str(each[key]) for key in ("views", "instances")} for each in categories
-    ]
-    print_table(rows, "The memory is empty.")
+    print_table([_row(each) for each in categories], "The memory is empty.")
 
 
 @app.command()
@@ -162,7 +159,8 @@ def reembed(
 
 def _row(category: dict[str, Any]) -> dict[str, str]:
     shown = {"id": category["id"][:8], "name": category["name"] or "–"}
-    return shown | {key: str(category[key]) for key in ("views", "instances", "created_at")}
+    learnt = category["created_at"][:19].replace("T", " ")
+    return shown | {"views": str(category["views"]), "instances": str(category["instances"]), "learnt": learnt}
 
 
 def _folder(data_dir: Path | None) -> Path:

@@ -1,8 +1,9 @@
 """Works on a memory until it is killed; run by test_crash.py.
 
-Reads lines `work MEMORY SOURCE JOURNAL SEED`, `wait PROCESS` and `look MEMORY SOURCE`; works and looks in processes forked from this
-one, which has everything imported. SOURCE holds `memory`, of which the reference, its views and tokens are taken, and `archive.zip`.
-Before each step the journal gets what the memory should hold after it, and a mark when it is done.
+Reads lines `work MEMORY SOURCE JOURNAL SEED`, `wait PROCESS`, `die MEMORY SOURCE JOURNAL SEED STEP MOMENT` and `look MEMORY SOURCE`;
+works, dies and looks in processes forked from this one, which has everything imported. SOURCE holds `memory`, of which the reference, its
+views and tokens are taken, and `archive.zip`. Before each step the journal gets what the memory should hold after it, and a mark when it
+is done.
 """
 
 from __future__ import annotations
@@ -10,6 +11,8 @@ from __future__ import annotations
 import json
 import os
 import random
+import shutil
+import signal
 import sys
 import traceback
 import zipfile
@@ -61,13 +64,31 @@ class Worker:
         self._tell("done", state(self._memory, self.encoded))
         while True:
             categories = self._memory.categories.all()
-            step = self.delete if len(categories) > MOST_CATEGORIES else self._random.choice(steps)
-            work = step(state(self._memory, self.encoded))
-            if work is not None:
-                expected, change = work
-                self._tell("begin", expected)
-                change()
-                self._tell("done", state(self._memory, self.encoded))
+            self._do(self.delete if len(categories) > MOST_CATEGORIES else self._random.choice(steps))
+
+    def die(self, step: str, moment: int) -> None:
+        """One step, and death at its so manieth moment: after a folder got its name, before a commit, before a folder is removed."""
+        left = [moment]
+
+        def tick() -> None:
+            left[0] -= 1
+            if left[0] == 0:
+                os.kill(os.getpid(), signal.SIGKILL)
+
+        rename, rmtree = Path.rename, shutil.rmtree
+        Path.rename = lambda *args: (rename(*args), tick())[0]
+        shutil.rmtree = lambda *args, **options: (tick(), rmtree(*args, **options))[1]
+        self._memory._connection._db.conn.set_trace_callback(lambda sql: tick() if sql == "COMMIT" else None)
+        self._tell("done", state(self._memory, self.encoded))
+        self._do(getattr(self, step))
+
+    def _do(self, step: Callable[[Known], tuple[Known, Callable[[], object]] | None]) -> None:
+        work = step(state(self._memory, self.encoded))
+        if work is not None:
+            expected, change = work
+            self._tell("begin", expected)
+            change()
+            self._tell("done", state(self._memory, self.encoded))
 
     def learn(self, known: Known) -> tuple[Known, Callable[[], object]]:
         name = self._new_name()
@@ -207,11 +228,12 @@ def start(work: Callable[[], object]) -> int:
     return pid
 
 
-def work(memory: Path, source: Path, journal: Path, seed: int) -> None:
-    """Works until it is killed; leaves a mark where it ends in another way."""
+def work(memory: Path, source: Path, journal: Path, seed: int, step: str | None = None, moment: int = 0) -> None:
+    """Works until it is killed, or does one step until its moment; leaves a mark where it ends in another way."""
     try:
         with Memory.open(memory) as opened:
-            Worker(opened, source, journal, seed).run()
+            worker = Worker(opened, source, journal, seed)
+            worker.run() if step is None else worker.die(step, moment)
     except BaseException:
         with journal.open("a") as marks:
             marks.write(json.dumps(["failed", traceback.format_exc()]) + "\n")
@@ -224,18 +246,20 @@ def answer(text: str) -> None:
 
 
 def main() -> None:
-    """Answers `work` with the id of the process, `wait` when that has ended, `look` with what was found."""
+    """Answers `work` with the id of the process, `wait` and `die` when it has ended, `look` with what was found."""
     for line in sys.stdin:
         verb, *words = line.split()
         if verb == "wait":
             os.waitpid(int(words[0]), 0)
             answer("gone")
-        elif verb == "work":
-            memory, source, journal = (Path(each) for each in words[:3])
-            answer(str(start(lambda: work(memory, source, journal, int(words[3])))))  # noqa: B023
-        else:
+        elif verb == "look":
             os.waitpid(start(lambda: answer(json.dumps(look(Path(words[0]), Path(words[1]))))), 0)  # noqa: B023
             answer("looked")
+        else:
+            memory, source, journal = (Path(each) for each in words[:3])
+            how = (words[4], int(words[5])) if verb == "die" else ()
+            pid = start(lambda: work(memory, source, journal, int(words[3]), *how))  # noqa: B023
+            answer(str(pid) if verb == "work" else f"ended {os.waitpid(pid, 0)[1]}")
 
 
 if __name__ == "__main__":

@@ -23,6 +23,8 @@ from store.memory import Memory
 
 ROOT = Path(__file__).parents[2]
 KILLS = 20
+STEPS = ("learn", "join", "split", "learn", "join", "forget", "rename", "merge", "delete", "undo", "bring")
+"""Each finds in the memory what it needs from those before."""
 LONGEST_S = 0.3
 """A step takes some hundredths of a second, opening the memory as long."""
 
@@ -109,3 +111,25 @@ def test_twenty_kills_leave_no_half_category(workers: Workers, source: Path, tmp
         before, version = known, found["version"]
     assert outcomes[(True, False)] + outcomes[(True, True)] >= KILLS // 4, "hardly any kill fell into a step"
     assert version > KILLS
+
+
+def test_a_kill_at_each_commit_and_folder_of_each_step_leaves_before_or_after(workers: Workers, source: Path, tmp_path: Path) -> None:
+    memory, journal = tmp_path / "memory", tmp_path / "journal"
+    seed, kills = 0, Counter()
+    for step in STEPS:
+        for moment in range(1, 100):
+            journal.unlink(missing_ok=True)
+            seed += 1
+            ended = workers.ask("die", memory, source, journal, seed, step, moment)
+            told = entries(journal)
+            assert "failed" not in dict(told), told[-1]
+            assert "begin" in dict(told), f"{step} was not possible"
+            found = workers.look(memory, source)
+            assert found is not None, f"{step}, moment {moment}: the memory is not whole"
+            (_, before), (_, expected), *rest = told
+            assert fits(expected, found["known"]) or (not rest and fits(before, found["known"])), f"{step}, moment {moment}: {found}"
+            if ended == "ended 0":
+                assert rest, told
+                break
+            kills[step] += 1
+    assert kills == {"learn": 16, "join": 4, "split": 2, "forget": 1, "rename": 1, "merge": 1, "delete": 1, "undo": 1, "bring": 3}
