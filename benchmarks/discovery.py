@@ -1,47 +1,74 @@
 """Known or novel: the paper's continual setting on any folder in the data layout, for every score side by side.
 
-Works on images alone; no depth and no cameras are needed. See `benchmarks.episodes` for what counts as an error.
+Works on images alone; where there is depth and cameras, `best` also verifies by pose. See `benchmarks.episodes` for what counts as an
+error and `benchmarks.calibrated` for the threshold that comes from a rate.
 """
 
 from __future__ import annotations
 
+import operator
 import time
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import reduce
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks import calibrated
+from benchmarks.agreements import agreements
+from benchmarks.best_pairs import BestPairs, BestSource
+from benchmarks.discovery_plot import plot
 from benchmarks.encoded import encode_all, read_encoded
-from benchmarks.episodes import Counts, draw_orders, episode
+from benchmarks.episodes import Counts, SetSource, draw_orders, episode
+from benchmarks.matches import matches
 from benchmarks.pair_scores import PARTS, FloatArray, PairScores, auroc
 from benchmarks.parallel import map_jobs
 from benchmarks.tables import Row, print_table, write_json
 from clients.datasets.sources import find_sequences
 from core.backbones.dino import load_backbone
+from core.calibration import Calibration, Prior
 from core.encode import Encoder
 from core.errors import InvalidInput
-from core.novelty import named_score
+from core.novelty import BEST, SCORES, require_score
 
-LEVELS = np.concatenate([np.linspace(0, 0.9, 20), 1 - np.geomspace(0.1, 0.001, 30), [1.0]])
+LEVELS = np.concatenate([np.linspace(0, 0.9, 10), 1 - np.geomspace(0.1, 0.001, 24), [1.0]])
 """Quantiles of the similarities between bursts at which a curve has a threshold: dense at the top, where the errors trade."""
 SUMS = 30
 """Further thresholds of a sum, which grows with the members of a category."""
 SUM_REACH = 10.0
 """How far those reach: the sum over all bursts, each presented this often."""
-JOB_EPISODES = 5
+JOB_EPISODES = 10
 """Episodes that a worker does in one go."""
 TINY = 1e-3
 """Added to the largest similarity there can be, so that a curve ends with everything novel."""
-SUMMARY = ("score", "auroc", "nearest", "fn_at_zero_fp", "fn_at_one_fp", "default_threshold", "default_fp", "default_fn")
+BAND = (0.05, 0.95)
+"""Of the episodes, which share of them the band around a curve holds."""
+TOKENS = "best, tokens alone"
+"""`best` as it is without depth."""
+SUMMARY = ("score", "auroc", "nearest", "fn_at_zero_fp", "fn_at_one_fp", "default_threshold", "default_fp", "default_fn", "repeat_error")
+RATE_COLUMNS = (
+    "score",
+    "asked_percent",
+    "false_known_percent",
+    "unknown_uncertain",
+    "mistaken",
+    "fp",
+    "fn",
+    "held_uncertain",
+    "categories",
+)
+
+Total = TypeVar("Total", Counts, calibrated.Answers)
 
 
 @dataclass(frozen=True, eq=False)
 class Job:
     """Some episodes of one score."""
 
-    pairs: PairScores
+    pairs: PairScores | BestPairs
     labels: NDArray[np.intp]
     orders: list[list[int]]
     thresholds: FloatArray
@@ -51,90 +78,168 @@ def run(
     data: Path,
     scores: Sequence[str],
     json: Path | None,
-    episodes: int = 100,
+    episodes: int = 1000,
     length: int = 250,
     seed: int = 0,
     backbone: str = "dinov2-s14",
+    picture: Path | None = None,
 ) -> list[Row]:
     """Runs `episodes` episodes of `length` bursts of `data` for every score (all of them where none is named).
 
-    Prints one summary line a score. Returns, and writes to `json`, rows of FP and FN against threshold with one summary row a score.
+    Prints one summary line a score, and for `best` one for each false-known rate. Returns, and writes to `json`, rows of FP and FN
+    against threshold with one summary row a score. `picture` gets the curves.
 
     Raises InvalidInput for an unknown score, or data without two categories or without two objects of one.
     """
     for score in scores:
-        named_score(score)
+        require_score(score)
     sequences = find_sequences(data)
     names, labels = np.unique([sequence.category for sequence in sequences], return_inverse=True)
     if len(names) < 2 or np.bincount(labels).max() < 2:
         raise InvalidInput("data", "discovery needs two categories, and two objects of one of them")
     network = load_backbone(backbone)
-    bursts = [read_encoded(file) for file in encode_all(sequences, Encoder(network))]
-    orders = draw_orders(episodes, len(bursts), length, seed)
+    files = encode_all(sequences, Encoder(network))
+    bursts = [read_encoded(file) for file in files]
+    tables: dict[str, PairScores | BestPairs] = {score: PairScores.of(bursts, score) for score in PARTS if score in (scores or PARTS)}
+    if not scores or BEST in scores:
+        best = BestPairs(matches(bursts, network.whitening), agreements(files, network.whitening), Prior.shipped())
+        alone = replace(best, agreement=None)
+        tables |= {BEST: best, TOKENS: alone} if has_poses(best) else {BEST: alone}
+    orders = draw_orders(episodes, labels, length, seed)
     started = time.perf_counter()
-    rows: list[Row] = []
-    for score in scores or PARTS:
-        rows += score_rows(PairScores.of(bursts, score), labels, orders)
-    seconds = time.perf_counter() - started
-    summaries = [row for row in rows if "auroc" in row]
+    rows = [row for name, table in tables.items() for row in score_rows(name, table, labels, orders)]
+    rates = [row for name, table in tables.items() if isinstance(table, BestPairs) for row in rate_rows(name, table, labels, orders)]
+    meta = {
+        "benchmark": "discovery",
+        "data": data,
+        "seed": seed,
+        "episodes": episodes,
+        "length": length,
+        "sequences": len(sequences),
+        "categories": len(names),
+        "backbone": network.name,
+        "fingerprint": network.fingerprint,
+        "episode_seconds": time.perf_counter() - started,
+    }
     if json is not None:
-        meta = {
-            "benchmark": "discovery",
-            "data": data,
-            "seed": seed,
-            "episodes": episodes,
-            "length": length,
-            "sequences": len(sequences),
-            "categories": len(names),
-            "backbone": network.name,
-            "fingerprint": network.fingerprint,
-            "episode_seconds": seconds,
-        }
-        write_json(json, meta, rows)
-    print_table(f"Discovery, {data}: {episodes} episodes of {length}", summaries, SUMMARY)
-    return rows
+        write_json(json, meta, rows + rates)
+    if picture is not None:
+        plot(picture, rows, f"{data.name}: {episodes} episodes of {length} of {len(sequences)} bursts")
+    print_table(f"Discovery, {data}: {episodes} episodes of {length}", [row for row in rows if "auroc" in row], SUMMARY)
+    if rates:
+        print_table("Threshold from a false-known rate", rates, RATE_COLUMNS)
+    return rows + rates
 
 
-def score_rows(pairs: PairScores, labels: NDArray[np.intp], orders: list[list[int]]) -> list[Row]:
+def has_poses(pairs: BestPairs) -> bool:
+    """Whether any pair of bursts could be laid on each other."""
+    return pairs.agreement is not None and bool(np.isfinite(pairs.agreement).any())
+
+
+def score_rows(name: str, pairs: PairScores | BestPairs, labels: NDArray[np.intp], orders: list[list[int]]) -> list[Row]:
     """A row for each threshold, ascending, then the summary row."""
-    single, own = pairs.single(), named_score(pairs.score).threshold
-    thresholds = threshold_grid(pairs, single, own)
-    chunks = [orders[start : start + JOB_EPISODES] for start in range(0, len(orders), JOB_EPISODES)]
-    jobs = [Job(pairs, labels, chunk, thresholds) for chunk in chunks]
-    parts = map_jobs(run_episodes, jobs, lambda job: len(job.orders), pairs.score)
-    counts = sum(parts[1:], start=parts[0])
-    fp, fn = counts.fp, counts.fn
-    curve = [
-        {"score": pairs.score, "threshold": float(threshold), "fp": float(fp[t]), "fn": float(fn[t])}
+    single, own = pairs.single(), default_threshold(name)
+    thresholds = threshold_grid(name, pairs, single, own)
+    counts = sum_jobs(run_episodes, pairs, labels, orders, thresholds, name)
+    fp, fn, repeat = counts.fp, counts.fn, counts.repeat_error
+    fp_band, fn_band = counts.bands(*BAND)
+    curve: list[Row] = [
+        {
+            "score": name,
+            "threshold": float(threshold),
+            "fp": float(fp[t]),
+            "fn": float(fn[t]),
+            "fp_band": fp_band[:, t].tolist(),
+            "fn_band": fn_band[:, t].tolist(),
+            "repeat_error": float(repeat[t]),
+        }
         for t, threshold in enumerate(thresholds)
     ]
     at_zero = min((t for t in range(len(thresholds)) if fp[t] == 0), key=lambda t: (fn[t], t))
+    at_one = min((t for t in range(len(thresholds)) if fp[t] <= 1), key=lambda t: (fn[t], t))
     default = int(np.abs(thresholds - own).argmin())
     same, other = same_and_other(single, labels)
-    summary = {
+    summary: Row = {
         **curve[at_zero],
         "auroc": auroc(same, other),
         "nearest": nearest_accuracy(single, labels),
         "fn_at_zero_fp": float(fn[at_zero]),
-        "fn_at_one_fp": float(fn[fp <= 1].min()),
+        "fn_at_one_fp": float(fn[at_one]),
         "default_threshold": own,
         "default_fp": float(fp[default]),
         "default_fn": float(fn[default]),
+        "categories_at_one_fp": (counts.categories[at_one] / len(orders)).round(2).tolist(),
+        "true_categories": (counts.truth / len(orders)).round(2).tolist(),
     }
     return [*curve, summary]
 
 
+def rate_rows(name: str, pairs: BestPairs, labels: NDArray[np.intp], orders: list[list[int]]) -> list[Row]:
+    """What was asked for and what came of it, a row for each rate; in percent."""
+    answers = sum_jobs(run_calibrated, pairs, labels, orders, np.array(calibrated.RATES), f"{name}, calibrated")
+
+    def percent(part: str, *whole: str) -> FloatArray:
+        return np.asarray(
+            100 * getattr(answers, part).sum(axis=0) / np.maximum(sum(getattr(answers, each) for each in whole).sum(axis=0), 1)
+        )
+
+    columns = {
+        "false_known_percent": percent("false_known", "unknown"),
+        "unknown_uncertain": percent("unknown_uncertain", "unknown"),
+        "mistaken": percent("mistaken", "holding"),
+        "fp": percent("false_known", "unknown", "holding") + percent("mistaken", "unknown", "holding"),
+        "fn": percent("missed", "holding"),
+        "held_uncertain": percent("holding_uncertain", "holding"),
+        "categories": answers.categories.mean(axis=0),
+    }
+    asked = [100 * rate for rate in calibrated.RATES]
+    return [{"score": name, "asked_percent": asked[t]} | {key: float(each[t]) for key, each in columns.items()} for t in range(len(asked))]
+
+
+def sum_jobs(
+    function: Callable[[Job], Total],
+    pairs: PairScores | BestPairs,
+    labels: NDArray[np.intp],
+    orders: list[list[int]],
+    thresholds: FloatArray,
+    name: str,
+) -> Total:
+    """What `function` counts over all orders, in parallel."""
+    chunks = [orders[start : start + JOB_EPISODES] for start in range(0, len(orders), JOB_EPISODES)]
+    return total(map_jobs(function, [Job(pairs, labels, chunk, thresholds) for chunk in chunks], lambda job: len(job.orders), name))
+
+
+def total(parts: Sequence[Total]) -> Total:
+    """The sum of at least one part."""
+    return reduce(operator.add, parts)
+
+
 def run_episodes(job: Job) -> Counts:
     """The counts of a job's episodes together."""
-    parts = [episode(job.pairs, job.labels, order, job.thresholds) for order in job.orders]
-    return sum(parts[1:], start=parts[0])
+    room = len(job.orders[0])
+    source = BestSource(job.pairs, room) if isinstance(job.pairs, BestPairs) else SetSource(job.pairs, room)
+    return total([episode(source, job.labels, order, job.thresholds) for order in job.orders])
 
 
-def threshold_grid(pairs: PairScores, single: FloatArray, own: float) -> FloatArray:
+def run_calibrated(job: Job) -> calibrated.Answers:
+    """The same with thresholds from rates."""
+    assert isinstance(job.pairs, BestPairs)
+    return total([calibrated.episode(job.pairs, job.labels, order, job.thresholds.tolist()) for order in job.orders])
+
+
+def default_threshold(name: str) -> float:
+    """The threshold of a score where nobody says otherwise; of `best` the one of a memory that has met nothing, at 1 %."""
+    if name in SCORES:
+        return SCORES[name].threshold
+    prior = Prior.shipped()
+    return Calibration.fit([], prior.of(name == BEST)).threshold(0.01)
+
+
+def threshold_grid(name: str, pairs: PairScores | BestPairs, single: FloatArray, own: float) -> FloatArray:
     """Ascending thresholds, shape (T,): where similarities lie, the score's own, and one that nothing exceeds."""
     top = float(single.max())  # of a burst to itself
     grid = [np.quantile(single[~np.eye(len(single), dtype=bool)], LEVELS), [own, top + TINY]]
-    if pairs.score == "paper_sum":
+    if name == "paper_sum" and isinstance(pairs, PairScores):
         grid.append(np.geomspace(top, pairs.total.sum(axis=0).max() * SUM_REACH + TINY, SUMS))
     return np.unique(np.concatenate(grid))
 

@@ -2,111 +2,174 @@
 
 A memory starts empty. Bursts arrive in random order; each joins the category it is most similar to where that exceeds the
 threshold, else founds a new one. A false positive joined a category whose majority is of another true category; a false
-negative founded one though its own had been seen. A repeat of a burst seen before is learnt from but not counted: it is
+negative founded one though its own had been seen. A repeat of a burst met before is learnt from but counted apart: it is
 trivially known.
 
-Letters: T thresholds, C categories of the memory (room for them), K true categories, N bursts, G views.
+Letters: E episodes, T thresholds, L bursts an episode presents, C categories of the memory (room for them), K true categories, N bursts.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.pair_scores import FloatArray, PairScores
 
+MOST_CATEGORIES, MOST_SEQUENCES = 20, 10
+"""The paper's episodes: 10 sequences of each of 20 categories, where there are as many."""
+
 
 @dataclass(frozen=True, eq=False)
 class Counts:
-    """What was counted over some bursts; counts of episodes add up."""
+    """What was counted; counts of further episodes add up."""
 
     false_positive: NDArray[np.intp]
-    """Shape (T,)."""
+    """Shape (E, T)."""
     false_negative: NDArray[np.intp]
-    """Shape (T,)."""
-    presented: int
-    """Bursts, repeats left out."""
-    seen: int
-    """Those of them whose category had been seen."""
+    """Shape (E, T)."""
+    presented: NDArray[np.intp]
+    """Bursts, repeats left out, shape (E,)."""
+    seen: NDArray[np.intp]
+    """Those of them whose category had been seen, shape (E,)."""
+    repeat_errors: NDArray[np.intp]
+    """Repeats that were called novel or joined another category, shape (E, T)."""
+    repeats: NDArray[np.intp]
+    """Shape (E,)."""
+    categories: NDArray[np.intp]
+    """Categories of the memory after each burst, summed over episodes, shape (T, L)."""
+    truth: NDArray[np.intp]
+    """True categories met until then, summed over episodes, shape (L,)."""
 
     def __add__(self, other: Counts) -> Counts:
         return Counts(
-            self.false_positive + other.false_positive,
-            self.false_negative + other.false_negative,
-            self.presented + other.presented,
-            self.seen + other.seen,
+            np.concatenate([self.false_positive, other.false_positive]),
+            np.concatenate([self.false_negative, other.false_negative]),
+            np.concatenate([self.presented, other.presented]),
+            np.concatenate([self.seen, other.seen]),
+            np.concatenate([self.repeat_errors, other.repeat_errors]),
+            np.concatenate([self.repeats, other.repeats]),
+            self.categories + other.categories,
+            self.truth + other.truth,
         )
 
     @property
     def fp(self) -> FloatArray:
         """False positives in percent of the bursts presented, shape (T,)."""
-        return np.asarray(100 * self.false_positive / max(self.presented, 1))
+        return np.asarray(100 * self.false_positive.sum(axis=0) / max(self.presented.sum(), 1))
 
     @property
     def fn(self) -> FloatArray:
         """False negatives in percent of the bursts whose category had been seen, shape (T,)."""
-        return np.asarray(100 * self.false_negative / max(self.seen, 1))
+        return np.asarray(100 * self.false_negative.sum(axis=0) / max(self.seen.sum(), 1))
+
+    @property
+    def repeat_error(self) -> FloatArray:
+        """Wrong answers to repeats, in percent of them, shape (T,)."""
+        return np.asarray(100 * self.repeat_errors.sum(axis=0) / max(self.repeats.sum(), 1))
+
+    def bands(self, low: float, high: float) -> tuple[FloatArray, FloatArray]:
+        """Quantiles over episodes of FP and of FN, each in percent, shape (2, T)."""
+        fp = 100 * self.false_positive / np.maximum(self.presented, 1)[:, None]
+        fn = 100 * self.false_negative / np.maximum(self.seen, 1)[:, None]
+        return np.quantile(fp, [low, high], axis=0), np.quantile(fn, [low, high], axis=0)
 
 
-class Memory:
-    """T memories side by side, one for each threshold, fed with the same bursts."""
+class Source(Protocol):
+    """Chooses, for T memories side by side, the category most similar to a burst."""
 
-    def __init__(self, pairs: PairScores, labels: NDArray[np.intp], thresholds: FloatArray, room: int) -> None:
-        self._pairs, self._labels, self._thresholds = pairs, labels, thresholds
-        count, (bursts, _, views) = len(thresholds), pairs.best.shape
-        self._categories = np.zeros(count, dtype=np.intp)
-        self._total = np.zeros((count, room, bursts), dtype=np.float32)
-        self._best = np.full((count, room, bursts, views), -1, dtype=np.float32)
-        self._views = np.zeros((count, room), dtype=np.intp)
-        self._votes = np.zeros((count, room, int(labels.max()) + 1), dtype=np.intp)
+    def begin(self, thresholds: int) -> None:
+        """Forgets everything."""
 
-    def meet(self, burst: int) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-        """Decides for `burst` and learns it. Returns whether it was known, and known but to another majority, shapes (T,), (T,)."""
-        rows, used = np.arange(len(self._thresholds)), int(self._categories.max())
-        chosen, known = self._categories.copy(), np.zeros(len(rows), dtype=bool)
-        if used:
-            views = np.maximum(self._views[:, :used], 1)
-            similarity = self._pairs.similarity(self._total[:, :used, burst], self._best[:, :used, burst], views, burst)
-            similarity = np.where(np.arange(used) < self._categories[:, None], similarity, -np.inf)
-            nearest = similarity.argmax(axis=1)
-            known = similarity[rows, nearest] > self._thresholds
-            chosen = np.where(known, nearest, chosen)
-        votes = self._votes[rows, chosen]
-        wrong = known & (votes[:, self._labels[burst]] < votes.max(axis=1))
-        self._learn(burst, rows, chosen)
-        self._categories += ~known
-        return known, wrong
+    def nearest(self, burst: int, used: NDArray[np.intp]) -> tuple[NDArray[np.intp], FloatArray]:
+        """The category and its similarity for each memory, shapes (T,), (T,), from the numbers of categories they have, shape (T,).
 
-    def _learn(self, burst: int, rows: NDArray[Any], chosen: NDArray[np.intp]) -> None:
+        The similarity is −inf where there is no category.
+        """
+
+    def learn(self, burst: int, chosen: NDArray[np.intp], rows: NDArray[np.intp]) -> None:
+        """Adds the burst to a category in each memory of `rows`; `chosen` has the shape of `rows`."""
+
+
+class SetSource:
+    """By a score of token sets: parts that add up, or take their maximum, over the members of a category."""
+
+    def __init__(self, pairs: PairScores, room: int) -> None:
+        self._pairs, self._room = pairs, room
+
+    def begin(self, thresholds: int) -> None:
+        """See `Source`."""
+        bursts, _, parts = self._pairs.best.shape
+        self._total = np.zeros((thresholds, self._room, bursts), dtype=np.float32)
+        self._best = np.full((thresholds, self._room, bursts, parts), -1, dtype=np.float32)
+        self._views = np.zeros((thresholds, self._room), dtype=np.intp)
+
+    def nearest(self, burst: int, used: NDArray[np.intp]) -> tuple[NDArray[np.intp], FloatArray]:
+        """See `Source`."""
+        most = int(used.max())
+        if not most:
+            return np.zeros_like(used), np.full(len(used), -np.inf)
+        views = np.maximum(self._views[:, :most], 1)
+        similarity = self._pairs.similarity(self._total[:, :most, burst], self._best[:, :most, burst], views, burst)
+        similarity = np.where(np.arange(most) < used[:, None], similarity, -np.inf)
+        nearest = similarity.argmax(axis=1)
+        return nearest, similarity[np.arange(len(used)), nearest]
+
+    def learn(self, burst: int, chosen: NDArray[np.intp], rows: NDArray[np.intp]) -> None:
+        """See `Source`."""
         self._total[rows, chosen] += self._pairs.total[burst]
         self._best[rows, chosen] = np.maximum(self._best[rows, chosen], self._pairs.best[burst])
         self._views[rows, chosen] += self._pairs.views[burst]
-        self._votes[rows, chosen, self._labels[burst]] += 1
 
 
-def episode(pairs: PairScores, labels: NDArray[np.intp], order: Sequence[int], thresholds: FloatArray) -> Counts:
+def episode(source: Source, labels: NDArray[np.intp], order: Sequence[int], thresholds: FloatArray) -> Counts:
     """One episode over the bursts at `order`.
 
     Args:
         labels: true category of every burst, 0 to K − 1, shape (N,).
         thresholds: shape (T,).
     """
-    memory = Memory(pairs, labels, thresholds, len(order))
-    counts = Counts(np.zeros(len(thresholds), dtype=np.intp), np.zeros(len(thresholds), dtype=np.intp), 0, 0)
+    count, rows = len(thresholds), np.arange(len(thresholds))
+    used = np.zeros(count, dtype=np.intp)
+    votes = np.zeros((count, len(order), int(labels.max()) + 1), dtype=np.intp)
+    wrong_sum, missed_sum, repeat_sum = (np.zeros(count, dtype=np.intp) for _ in range(3))
+    categories, truth = np.zeros((count, len(order)), dtype=np.intp), np.zeros(len(order), dtype=np.intp)
+    met: set[int] = set()
+    kinds: set[int] = set()
+    presented = seen = 0
+    source.begin(count)
     for position, burst in enumerate(order):
-        before = order[:position]
-        known, wrong = memory.meet(burst)
-        if burst in before:
-            continue
-        seen = bool((labels[list(before)] == labels[burst]).any()) if before else False
-        counts += Counts(wrong.astype(np.intp), (~known & seen).astype(np.intp), 1, int(seen))
-    return counts
+        label = int(labels[burst])
+        chosen, similarity = source.nearest(burst, used)
+        known = similarity > thresholds
+        chosen = np.where(known, chosen, used)
+        joined = votes[rows, chosen]
+        wrong = known & (joined[:, label] < joined.max(axis=1))
+        if burst in met:
+            repeat_sum += wrong | ~known
+        else:
+            presented, seen = presented + 1, seen + (label in kinds)
+            wrong_sum += wrong
+            missed_sum += ~known & (label in kinds)
+        votes[rows, chosen, label] += 1
+        source.learn(burst, chosen, rows)
+        used = used + ~known
+        met.add(burst)
+        kinds.add(label)
+        categories[:, position], truth[position] = used, len(kinds)
+    one = [np.array([each]) for each in (presented, seen, len(order) - presented)]
+    return Counts(wrong_sum[None], missed_sum[None], one[0], one[1], repeat_sum[None], one[2], categories, truth)
 
 
-def draw_orders(count: int, bursts: int, length: int, seed: int) -> list[list[int]]:
-    """`count` seeded episodes of `length` bursts drawn at random with replacement, as the paper does (250 of 200)."""
-    return np.random.default_rng(seed).integers(bursts, size=(count, length)).tolist()
+def draw_orders(count: int, labels: NDArray[Any], length: int, seed: int) -> list[list[int]]:
+    """`count` seeded episodes of `length` bursts, drawn with replacement from MOST_SEQUENCES of each of MOST_CATEGORIES categories."""
+    rng = np.random.default_rng(seed)
+    orders: list[list[int]] = []
+    for _ in range(count):
+        kinds = rng.permutation(np.unique(labels))[:MOST_CATEGORIES]
+        pool = np.concatenate([rng.permutation(np.flatnonzero(labels == kind))[:MOST_SEQUENCES] for kind in kinds])
+        orders.append(pool[rng.integers(len(pool), size=length)].tolist())
+    return orders

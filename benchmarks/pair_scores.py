@@ -19,7 +19,7 @@ from scipy.stats import rankdata
 from core.descriptors import unit
 from core.encode import EncodedBurst
 from core.errors import InvalidInput
-from core.novelty import named_score, paper_sum
+from core.novelty import SCORES, paper_sum
 
 FloatArray = NDArray[np.floating[Any]]
 
@@ -39,9 +39,9 @@ class PairScores:
     @staticmethod
     def of(bursts: Sequence[EncodedBurst], score: str) -> PairScores:
         """Raises InvalidInput for a score of which the parts are not known here."""
-        token = named_score(score).token
         if score not in PARTS:
-            raise InvalidInput("score", f"{score!r} cannot be benchmarked over episodes; one of {', '.join(PARTS)} can")
+            raise InvalidInput("score", f"{score!r} is none of {', '.join(PARTS)}")
+        token = SCORES[score].token
         tokens = [unit(getattr(burst, token)) for burst in bursts]
         count, most = len(tokens), 1 if PARTS[score] == "maximum" else 0
         total = np.zeros((count, count), dtype=np.float32)
@@ -49,7 +49,7 @@ class PairScores:
         for i, member in enumerate(tokens):
             for j, target in enumerate(tokens):
                 if most:
-                    best[i, j] = named_score(score).similarity(member, target)
+                    best[i, j] = SCORES[score].similarity(member, target)
                 else:
                     total[i, j] = paper_sum(member, target)
         return PairScores(score, np.array([len(each) for each in tokens]), total, best)

@@ -23,7 +23,8 @@ from clients.datasets.sources import find_sequences
 from core.backbones.dino import load_backbone
 from core.encode import EncodedBurst, Encoder
 from core.errors import InvalidInput
-from core.novelty import DEFAULT_SCORE, SCORES, Member, decide
+from core.evidence import sample_patches
+from core.novelty import DEFAULT_SCORE, SCORE_NAMES, DecisionConfig, Member, decide
 from core.pose import VARIANTS, PoseConfig, PoseEstimator
 from core.reference import Reference, build_reference
 from core.views import Burst
@@ -68,9 +69,9 @@ def run(
     encoder = Encoder(network)
     scanned, target = encoder.encode(reference_burst), encoder.encode(target_burst)
     reference = build_reference(scanned)
-    memory = [Member("reference", scanned.cls, scanned.pooled)]
+    memory = [Member("reference", scanned.cls, scanned.pooled, sample_patches(scanned))]
     operations: dict[str, Operation] = {"encode": partial(_encode, encoder, target_burst), "learn": partial(_learn, scanned)}
-    operations |= {f"decide {score}": partial(_decide, memory, target, score) for score in SCORES}
+    operations |= {f"decide {score}": partial(_decide, memory, target, score) for score in SCORE_NAMES}
     operations |= {f"solve {name}": partial(_solve, PoseEstimator(PoseConfig.named(name)), reference, target) for name in VARIANTS}
     rows = table_rows(_rounds(operations, rounds), OBSERVATION)
     if json is not None:
@@ -125,7 +126,7 @@ def _learn(scanned: EncodedBurst) -> dict[str, float]:
 
 
 def _decide(memory: Sequence[Member], target: EncodedBurst, score: str) -> dict[str, float]:
-    decide(memory, target, score=score)
+    decide(memory, target, DecisionConfig(score))
     return {}
 
 

@@ -200,7 +200,9 @@ class Info:
     backbone: str
     fingerprint: str
     score: str
-    threshold: float
+    threshold: float | None
+    """None where the score, or the rate, decides."""
+    false_known_rate: float
     variant: str
     categories: int
     memory_version: int
@@ -228,9 +230,17 @@ class Observation(Generic[S]):
     """Of a novel object: to be carried out so that it becomes a category."""
     scan_error: str | None
     similarities: tuple[CategorySimilarity, ...]
-    """Every category compared with, most similar first."""
+    """Categories, most similar first."""
     threshold: float | None
     """Least similarity of a known object; None where the request named the category."""
+    margin: float | None
+    """By how much the most similar category leads the next."""
+    probability: float | None
+    """Estimated, that the most similar category is right."""
+    candidates: tuple[str, ...]
+    """Categories that an uncertain object may be of."""
+    viewpoints: FloatArray | None
+    """Of an uncertain object: world_from_camera of where to look next, most telling first, shape (n, 4, 4)."""
     timings_ms: Mapping[str, float]
     """Milliseconds of each stage in the service, and their `total`."""
     raw: Mapping[str, Any]
@@ -254,6 +264,10 @@ class Observation(Generic[S]):
             scan_error=fields["scan_error"],
             similarities=tuple(CategorySimilarity.from_json(each) for each in fields["similarities"]),
             threshold=fields["threshold"],
+            margin=fields["margin"],
+            probability=fields["probability"],
+            candidates=tuple(fields["candidates"]),
+            viewpoints=None if fields["viewpoints"] is None else np.array(fields["viewpoints"], dtype=float).reshape(-1, 4, 4),
             timings_ms=fields["timings_ms"],
             raw=fields,
         )

@@ -1,6 +1,6 @@
-"""Known or novel: similarity of a burst to every category, against a threshold (paper, "Continual category learning").
+"""Known, uncertain or novel: a burst against every category (paper, "Continual category learning", and ours).
 
-Letters: F views of a category over all its bursts, G views of the target, D token size.
+Letters: F views of a category over all its bursts, G views of the target, V views, K patches of a view, D token size.
 """
 
 from __future__ import annotations
@@ -12,11 +12,26 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from core.backbones.whitening import Whitening
+from core.calibration import Calibration, Prior
 from core.descriptors import unit
 from core.encode import EncodedBurst
 from core.errors import InvalidInput
+from core.evidence import Comparison, Entry, centre, directions, most_similar_members, sample_patches, whitened
 
 FloatArray = NDArray[np.floating]
+Outcome = Literal["known", "uncertain", "novel"]
+Verify = Callable[[str], float]
+"""How well the best pose of a category's reference explains the burst (`core.verification`), 0 where there is none."""
+
+BEST = "best"
+VERIFIED = 3
+"""Categories whose poses are tried, those with the most evidence first."""
+UNCERTAIN_FACTOR = 10.0
+"""An object of no known category is answered `known` at the rate asked for, and `known` or `uncertain` at ten times that."""
+LEARN_FACTOR = 0.1
+"""Evidence that an object of no known category reaches at a tenth of the rate lets a burst join: a false answer is over when it is given,
+a false member misleads every later one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,17 +43,61 @@ class Member:
     """[CLS] of each view, shape (V, D)."""
     pooled: FloatArray
     """Mean foreground token of each view, whitened where the backbone has statistics, shape (V, D)."""
+    patches: FloatArray | None = None
+    """Of `core.evidence.sample_patches`, shape (V, K, D)."""
+
+
+@dataclass(frozen=True)
+class DecisionConfig:
+    """How to decide."""
+
+    score: str = BEST
+    threshold: float | None = None
+    """Least similarity of a known object, and no third answer; None leaves it to the rate, or to a paper score's own default."""
+    false_known_rate: float = 0.01
+    """Of objects of no known category, how many may be called known; of score `best`."""
+
+    def __post_init__(self) -> None:
+        require_score(self.score)
+        if not 0 < self.false_known_rate <= 0.5:
+            raise InvalidInput("false_known_rate", f"expected a share above 0 and at most 0.5, found {self.false_known_rate}")
 
 
 @dataclass(frozen=True, eq=False)
 class Decision:
     """What a burst is taken for, and why."""
 
-    outcome: Literal["known", "uncertain", "novel"]
+    outcome: Outcome
     score: str
     threshold: float
+    """Above it a burst is known."""
     similarities: tuple[tuple[str, float], ...]
-    """(category id, similarity), most similar first."""
+    """(category id, similarity), most similar first; with score `best` of the few best matching ones."""
+    uncertain_above: float = 0.0
+    """Between it and the threshold a burst is uncertain. Both are equal where there is no third answer."""
+    learn_above: float = 0.0
+    """Above it a known burst joins its category."""
+    probability: float | None = None
+    """Estimated, that the most similar category is right, at even odds beforehand."""
+    verified: bool = False
+    """Whether poses of the shortlist took part."""
+    rival: float | None = None
+    """Similarity of the best wrong category, as far as the decision tells which is wrong: what later thresholds are made of."""
+
+    @property
+    def similarity(self) -> float | None:
+        """Of the most similar category."""
+        return self.similarities[0][1] if self.similarities else None
+
+    @property
+    def margin(self) -> float | None:
+        """By how much the most similar category leads."""
+        return self.similarities[0][1] - self.similarities[1][1] if len(self.similarities) > 1 else None
+
+    @property
+    def candidates(self) -> tuple[str, ...]:
+        """Categories that an uncertain burst may be of: those that no clear answer rules out."""
+        return tuple(category for category, similarity in self.similarities if similarity > self.uncertain_above)
 
 
 def paper_sum(category: FloatArray, target: FloatArray) -> float:
@@ -80,20 +139,41 @@ SCORES = {
     "paper_mean": Score("cls", paper_mean, "views", 0.8),
     "pooled_best_view": Score("pooled", best_view, "bursts", 0.4),
 }
-DEFAULT_SCORE = "pooled_best_view"
+"""Those that compare two sets of tokens and nothing else; `best` is not among them."""
+DEFAULT_SCORE = BEST
+SCORE_NAMES = (BEST, *SCORES)
 
 
-def named_score(name: str) -> Score:
-    """A score by name. Raises InvalidInput for an unknown one."""
-    if name not in SCORES:
-        raise InvalidInput("score", f"{name!r} is none of {', '.join(SCORES)}")
-    return SCORES[name]
+def require_score(name: str) -> None:
+    """Raises InvalidInput for an unknown score."""
+    if name not in SCORE_NAMES:
+        raise InvalidInput("score", f"{name!r} is none of {', '.join(SCORE_NAMES)}")
 
 
-def decide(memory: Sequence[Member], target: EncodedBurst, *, score: str = DEFAULT_SCORE, threshold: float | None = None) -> Decision:
-    """The most similar category if it is similar enough; else novel. An empty memory finds everything novel."""
-    named = named_score(score)
-    limit = named.threshold if threshold is None else threshold
+@dataclass(frozen=True, eq=False)
+class Context:
+    """What `best` knows beside the memory and the burst."""
+
+    whitening: Whitening | None = None
+    """The backbone's."""
+    past: Sequence[Decision] = ()
+    """Earlier decisions of this memory, which calibrate it."""
+    verify: Verify | None = None
+    """Where the burst has depth and cameras."""
+
+
+def decide(
+    memory: Sequence[Member], target: EncodedBurst, config: DecisionConfig | None = None, context: Context | None = None
+) -> Decision:
+    """The most similar category if it is similar enough; uncertain where that cannot be told; else novel.
+
+    An empty memory finds everything novel. Members without patches are no part of `best`.
+    """
+    config = config or DecisionConfig()
+    if config.score == BEST:
+        return _by_evidence(memory, target, config, context or Context())
+    named = SCORES[config.score]
+    limit = named.threshold if config.threshold is None else config.threshold
     tokens: dict[str, list[FloatArray]] = {}
     for member in memory:
         tokens.setdefault(member.category_id, []).append(getattr(member, named.token))
@@ -101,10 +181,55 @@ def decide(memory: Sequence[Member], target: EncodedBurst, *, score: str = DEFAU
     similarities = {category: _similarity(named, [unit(each) for each in bursts], asked) for category, bursts in tokens.items()}
     ranked = tuple(sorted(similarities.items(), key=lambda entry: (-entry[1], entry[0])))
     known = bool(ranked) and ranked[0][1] > limit
-    return Decision("known" if known else "novel", score, limit, ranked)
+    return Decision("known" if known else "novel", config.score, limit, ranked, limit, limit)
 
 
 def _similarity(score: Score, bursts: Sequence[FloatArray], target: FloatArray) -> float:
     if score.over == "views":
         return score.similarity(np.concatenate(bursts), target)
     return max(score.similarity(burst, target) for burst in bursts)
+
+
+def _by_evidence(memory: Sequence[Member], target: EncodedBurst, config: DecisionConfig, context: Context) -> Decision:
+    prior, verified = Prior.shipped(), context.verify is not None
+    comparison = _compare(memory, target, context.whitening, prior.cohort)
+    evidence = comparison.ranked() if comparison else []
+    agreements = {category: context.verify(category) for category, _ in evidence[:VERIFIED]} if context.verify else {}
+
+    def weighed(ranked: Sequence[tuple[str, float]]) -> tuple[tuple[str, float], ...]:
+        kept = [(category, value + prior.agreement_weight * agreements.get(category, 0.0)) for category, value in ranked]
+        return tuple(sorted(kept, key=lambda entry: (-entry[1], entry[0])))
+
+    similarities = weighed(evidence)
+    rivals = [each.rival for each in context.past if each.rival is not None and each.verified == verified]
+    calibration = Calibration.fit(rivals, prior.of(verified))
+    threshold, uncertain_above, learn_above = (
+        calibration.threshold(min(factor * config.false_known_rate, 0.5)) if config.threshold is None else config.threshold
+        for factor in (1.0, UNCERTAIN_FACTOR, LEARN_FACTOR)
+    )
+    best = similarities[0][1] if similarities else -np.inf
+    outcome: Outcome = "known" if best > threshold else "uncertain" if best > uncertain_above else "novel"
+    wrong = similarities
+    if outcome == "known" and comparison:
+        wrong = weighed(comparison.ranked(without=similarities[0][0]))
+    return Decision(
+        outcome,
+        config.score,
+        threshold,
+        similarities,
+        uncertain_above,
+        learn_above,
+        calibration.probability(best) if similarities else None,
+        verified,
+        wrong[0][1] if wrong and outcome != "uncertain" else None,
+    )
+
+
+def _compare(memory: Sequence[Member], target: EncodedBurst, whitening: Whitening | None, cohort: float) -> Comparison | None:
+    members = most_similar_members([member for member in memory if member.patches is not None], target.pooled)
+    patches = [whitened(member.patches, whitening) for member in members if member.patches is not None]
+    if not patches:
+        return None
+    middle = centre(patches)
+    entries = [Entry(member.category_id, directions(each, middle)) for member, each in zip(members, patches)]
+    return Comparison(entries, directions(whitened(sample_patches(target), whitening), middle), cohort)

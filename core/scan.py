@@ -121,11 +121,11 @@ def exclude(request: ScanRequest, unreachable: Sequence[int]) -> ScanRequest:
         raise InvalidInput("viewpoints", f"{wrong[0]} is none of the scan's viewpoints 0 to {count - 1}")
     excluded = np.concatenate([request.excluded, request.world_from_camera[sorted(set(unreachable))]])
     offered = hemisphere(request.center_m, request.up, request.radius_m, CANDIDATES)
-    offered = offered[(_angles_deg(offered, excluded, request.center_m) > REACH_DEG).all(axis=1)]
+    offered = offered[(angles_about_deg(offered, excluded, request.center_m) > REACH_DEG).all(axis=1)]
     poses: list[FloatArray | None] = [None if index in unreachable else pose for index, pose in enumerate(request.world_from_camera)]
     for index in sorted(set(unreachable)):
         kept = [pose for pose in poses if pose is not None]
-        nearest = _angles_deg(offered, np.stack(kept), request.center_m).min(axis=1) if kept else np.full(len(offered), 180.0)
+        nearest = angles_about_deg(offered, np.stack(kept), request.center_m).min(axis=1) if kept else np.full(len(offered), 180.0)
         if len(offered) and nearest.max() > REACH_DEG / 2:
             poses[index] = offered[int(nearest.argmax())]
     left = [pose for pose in poses if pose is not None]
@@ -151,7 +151,7 @@ def coverage(request: ScanRequest, world_from_camera: Sequence[FloatArray]) -> C
     near = [nearest_view(pose, request.world_from_camera, request.center_m) for pose in world_from_camera]
     viewpoints = tuple(index if angle <= REACH_DEG else None for index, angle in near)
     taken = np.stack(world_from_camera) if len(world_from_camera) else np.empty((0, 4, 4))
-    covered = np.any(_angles_deg(request.world_from_camera, taken, request.center_m) <= REACH_DEG, axis=1)
+    covered = np.any(angles_about_deg(request.world_from_camera, taken, request.center_m) <= REACH_DEG, axis=1)
     return Coverage(viewpoints, tuple(angle for _, angle in near), tuple(map(bool, np.atleast_1d(covered))))
 
 
@@ -184,12 +184,12 @@ def look_at(position_m: FloatArray, aim_m: FloatArray, up: FloatArray) -> FloatA
 
 def nearest_view(world_from_camera: FloatArray, candidates: FloatArray, center_m: FloatArray) -> tuple[int, float]:
     """Which of the candidate poses, shape (n, 4, 4), sees the object most nearly from the side of a pose, and the angle off in degrees."""
-    angles = _angles_deg(world_from_camera[None], candidates, center_m)[0]
+    angles = angles_about_deg(world_from_camera[None], candidates, center_m)[0]
     best = int(angles.argmin())
     return best, float(angles[best])
 
 
-def _angles_deg(first: FloatArray, second: FloatArray, center_m: FloatArray) -> FloatArray:
+def angles_about_deg(first: FloatArray, second: FloatArray, center_m: FloatArray) -> FloatArray:
     """Angles about the object between cameras, shapes (n, 4, 4) and (m, 4, 4), shape (n, m)."""
     left, right = ((poses[:, :3, 3] - center_m) for poses in (first, second))
     left, right = (each / np.linalg.norm(each, axis=1, keepdims=True).clip(1e-12) for each in (left, right))

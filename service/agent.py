@@ -13,7 +13,7 @@ from core.encode import EncodedBurst, Encoder
 from core.errors import InvalidInput, NoPose, Unavailable
 from core.grounds import grounds
 from core.matches import PoseEstimate
-from core.novelty import Decision, decide, named_score
+from core.novelty import DEFAULT_SCORE, Decision, DecisionConfig
 from core.packing import burst_from_arrays
 from core.pose import PoseConfig, PoseEstimator, PoseOptions
 from core.reference import Reference
@@ -23,6 +23,7 @@ from service.curation import Curation
 from service.events import Events
 from service.features import best_pair, features_as_arrays
 from service.goals import Rearranging
+from service.judgement import VERIFYING, Judge, Judgement
 from service.scanning import Scanning
 from store.memory import Memory
 from store.observations import Answer, Joins
@@ -33,15 +34,17 @@ from store.records import Alternative, Observation, Pose
 class AgentConfig:
     """What holds for every request that does not say otherwise."""
 
-    score: str
+    score: str = DEFAULT_SCORE
     threshold: float | None = None
-    """Where left out: what the memory was calibrated to, else the score's own."""
+    """Least similarity of a known object, and no third answer; None leaves it to the score, of `best` to the rate."""
     variant: str = "ucd"
     scan_views: int = DEFAULT_VIEWPOINTS
+    false_known_rate: float = DecisionConfig.false_known_rate
+    """Of objects of no known category, how many may be called known; of score `best`."""
 
     def validate(self) -> None:
         """Raises InvalidInput for an unknown score or variant."""
-        named_score(self.score)
+        DecisionConfig(self.score, self.threshold, self.false_known_rate)
         PoseConfig.named(self.variant)
 
 
@@ -52,13 +55,15 @@ class ObserveOptions:
     category_id: str | None = None
     """Takes the object for one of this category and skips the decision."""
     threshold: float | None = None
+    false_known_rate: float | None = None
     variant: str | None = None
     pose: PoseOptions = field(default_factory=PoseOptions)
     """Of that variant."""
     alternatives: int | None = None
     """Most other transforms to be given; the variant's own number where left out."""
     learn: bool = True
-    """A known object's burst joins its category; False leaves what is known as it is."""
+    """A known object's burst joins its category where the evidence is strong, and the decision counts for later thresholds. False leaves
+    what is known as it is: the observation is kept, and nothing is learnt from it."""
     up: tuple[float, float, float] | None = None
     """For the scan of a novel object."""
     seed: int = 0
@@ -84,14 +89,6 @@ class Agent:
         self.curation = Curation(self.encoder, memory, self.events, config.score)
         self.rearranging = Rearranging(self.observe_known, memory, self.events)
 
-    @property
-    def threshold(self) -> float:
-        """Least similarity of a known object, where a request names none."""
-        if self.config.threshold is not None:
-            return self.config.threshold
-        calibrated = self.memory.setting(f"threshold {self.config.score}")
-        return named_score(self.config.score).threshold if calibrated is None else calibrated
-
     def observe(self, burst: Burst, options: ObserveOptions | None = None, *, frame: str | None = None) -> Observation:
         """Decides what `burst` shows; a known object gets a pose and joins its category, a novel one gets a scan. The observation is kept.
 
@@ -104,7 +101,9 @@ class Agent:
         clock = StageClock()
         encoded = self.encoder.encode(burst)
         clock.lap("encode")
-        decision = None if options.category_id is not None else self.decide(encoded, options.threshold)
+        judge = Judge(self.memory, encoded, self.backbone.whitening, options.seed)
+        judged = None if options.category_id is not None else self._judge(judge, options)
+        decision = judged.decision if judged else None
         clock.lap("decide")
         outcome = decision.outcome if decision else "known"
         category_id = None
@@ -113,15 +112,14 @@ class Agent:
         if outcome == "known":
             category_id = decision.similarities[0][0] if decision else options.category_id
             assert category_id is not None
-            pose = self._pose(category_id, burst, encoded, estimator, options.seed, clock)
+            pose = self._pose(category_id, burst, judge, estimator, clock)
         elif outcome == "novel":
             request, scan_error = self._scan_or_reason(encoded, options.up)
         estimate, record, pose_error = pose
         timings = _timings(clock, encoded, estimate)
-        answer = Answer(outcome, category_id, frame, decision, record, pose_error, scan_error, timings, grounds(burst, encoded))
-        joins = None
-        if options.learn and category_id is not None:
-            joins = Joins(category_id, encoded, decision.similarities[0][1] if decision else None, "decision" if decision else "named")
+        viewpoints = judged.viewpoints if judged else None
+        answer = Answer(outcome, category_id, frame, decision, record, pose_error, scan_error, timings, grounds(burst, encoded), viewpoints)
+        joins = _joins(category_id, encoded, decision) if options.learn else None
         features = features_as_arrays(encoded, estimate)
         observation = self.memory.observations.create(answer, burst, features, request, joins=joins)
         self.events.publish("observation", id=observation.id, outcome=outcome, category_id=category_id, timings_ms=timings)
@@ -130,11 +128,6 @@ class Agent:
     def observe_known(self, burst: Burst, category_id: str, frame: str | None) -> Observation:
         """The pose of an object that is known to be of a category; nothing is learnt."""
         return self.observe(burst, ObserveOptions(category_id, learn=False), frame=frame)
-
-    def decide(self, encoded: EncodedBurst, threshold: float | None = None) -> Decision:
-        """What a burst is taken for."""
-        limit = self.threshold if threshold is None else threshold
-        return decide(self.memory.instances.members(), encoded, score=self.config.score, threshold=limit)
 
     def names(self) -> dict[str, str | None]:
         """Of all categories, by id."""
@@ -150,13 +143,20 @@ class Agent:
             return config
         return replace(config, best=replace(config.best, alternatives=options.alternatives))
 
-    def _pose(
-        self, category_id: str, burst: Burst, encoded: EncodedBurst, estimator: PoseEstimator, seed: int, clock: StageClock
-    ) -> _PoseOrReason:
+    def _judge(self, judge: Judge, options: ObserveOptions) -> Judgement:
+        threshold = self.config.threshold if options.threshold is None else options.threshold
+        rate = self.config.false_known_rate if options.false_known_rate is None else options.false_known_rate
+        judged = judge.judge(DecisionConfig(self.config.score, threshold, rate))
+        return judged if options.learn else replace(judged, decision=replace(judged.decision, rival=None))
+
+    def _pose(self, category_id: str, burst: Burst, judge: Judge, estimator: PoseEstimator, clock: StageClock) -> _PoseOrReason:
+        if category_id in judge.poses and estimator.config == VERIFYING:
+            reference, estimate = judge.poses[category_id]
+            return estimate, _pose_record(estimate, reference, burst), None
         try:
             reference = self.memory.categories.reference(category_id)
             clock.lap("load")
-            estimate = estimator.estimate(reference, encoded, seed=seed)
+            estimate = estimator.estimate(reference, judge.encoded, seed=judge.seed)
         except (NoPose, InvalidInput, Unavailable) as error:  # one damaged category leaves the others working
             return None, None, str(error)
         finally:
@@ -170,6 +170,16 @@ class Agent:
             if error.field == "up":
                 raise
             return None, str(error)
+
+
+def _joins(category_id: str | None, encoded: EncodedBurst, decision: Decision | None) -> Joins | None:
+    """A burst joins the category that the caller named, or that the decision is surer of than its answer needs to be."""
+    if category_id is None:
+        return None
+    if decision is None:
+        return Joins(category_id, encoded, None, "named")
+    similarity = decision.similarities[0][1]
+    return Joins(category_id, encoded, similarity, "decision") if similarity > decision.learn_above else None
 
 
 def _pose_record(estimate: PoseEstimate, reference: Reference, burst: Burst) -> Pose:

@@ -80,7 +80,7 @@ def checked_backbone(settings: Settings) -> Backbone:
 def _checked(settings: Settings, backbone: Backbone | None = None) -> Iterator[tuple[Memory, Backbone, AgentConfig]]:
     """What is wrong with the settings is told before a backbone is loaded, which takes long."""
     settings.require_safe()
-    config = AgentConfig(settings.score, settings.threshold, settings.variant, settings.scan_views)
+    config = AgentConfig(settings.score, settings.threshold, settings.variant, settings.scan_views, settings.false_known_rate)
     config.validate()
     with Memory.open(settings.data_dir, settings.retention) as memory:
         yield memory, backbone or load_backbone(settings.backbone, device=settings.device, report=log.info), config

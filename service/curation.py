@@ -10,12 +10,15 @@ import numpy as np
 from core.descriptors import unit
 from core.encode import Encoder
 from core.errors import Conflict, InvalidInput, Unavailable
-from core.novelty import Member, named_score
+from core.novelty import SCORES, Member
 from core.reference import MIN_VIEWS, build_reference
 from core.views import Burst, FloatArray
 from service.events import Events
 from store.memory import Memory
 from store.records import Category, Instance
+
+OVERVIEW = "pooled_best_view"
+"""Stands in for `best`, whose evidence depends on what else is known."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,6 +30,8 @@ class Similarities:
     """Of each pair of instances, shape (I, I)."""
     categories: tuple[tuple[str, float], ...]
     """(id, similarity) of the other categories, most similar first."""
+    score: str
+    """By which all of this is told."""
 
 
 class Curation:
@@ -36,7 +41,7 @@ class Curation:
         self._encoder = encoder
         self._memory = memory
         self._events = events
-        self._score = score
+        self._score = score if score in SCORES else OVERVIEW
 
     def rename(self, category_id: str, name: str | None, *, actor: str | None = None) -> Category:
         """Raises NotFound."""
@@ -81,9 +86,9 @@ class Curation:
         self._events.publish("instance_forgotten", id=instance_id, category_id=category_id)
 
     def similarities(self, category_id: str) -> Similarities:
-        """By the score that decides. Raises NotFound, and Unavailable where tokens of the category are damaged."""
+        """By the score that decides, where it compares two bursts and nothing else, or by OVERVIEW. Raises NotFound, and Unavailable where tokens of the category are damaged."""
         self._memory.categories.get(category_id)
-        score = named_score(self._score)
+        score = SCORES[self._score]
         bursts: dict[str, list[FloatArray]] = {}
         for member in self._memory.instances.members():
             bursts.setdefault(member.category_id, []).append(unit(_tokens(member, score.token)))
@@ -94,7 +99,7 @@ class Curation:
         matrix = np.array([[score.similarity(left, right) for right in own] for left in own])
         others = {each: max(score.similarity(left, right) for left in own for right in theirs) for each, theirs in bursts.items()}
         ranked = sorted(others.items(), key=lambda entry: (-entry[1], entry[0]))
-        return Similarities(instances, matrix, tuple(ranked))
+        return Similarities(instances, matrix, tuple(ranked), self._score)
 
     def _reference_burst(self, instance_ids: Sequence[str]) -> Burst:
         for instance_id in instance_ids:

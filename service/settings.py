@@ -35,6 +35,9 @@ class Settings(BaseSettings):
     device: str = Field("cpu", description="Torch device of the backbone: `cpu`, `cuda`, `cuda:1`.")
     score: str = Field(DEFAULT_SCORE, description="How similar two bursts are, for the decision.")
     threshold: float | None = Field(None, description="Least similarity of a known object; the score's own default where left out.")
+    false_known_rate: float = Field(
+        0.01, gt=0, le=0.5, description="Of objects of no known category, the share that may be called known; of score `best`."
+    )
     variant: str = Field("best", description="Variant of the pose pipeline.")
     max_upload_mb: int = Field(128, gt=0, description="Largest request body, in megabytes of 1 000 000 bytes.")
     workers: int = Field(2, gt=0, description="Requests that are worked on at once; those that come together share passes of the backbone.")

@@ -46,6 +46,10 @@ def arrays_file(files: Files) -> tuple[str, FileSum]:
     return next((name, file) for name, file in files.items() if name.endswith(".npz"))
 
 
+PATCH_TYPE = np.dtype("<f2")
+"""Patches are drawn in half precision."""
+
+
 def to_blob(tokens: NDArray[np.floating]) -> bytes:
     """One token a view, shape (V, D), as bytes."""
     return np.ascontiguousarray(tokens, dtype=BLOB_TYPE).tobytes()
@@ -54,3 +58,13 @@ def to_blob(tokens: NDArray[np.floating]) -> bytes:
 def from_blob(blob: bytes, views: int) -> NDArray[np.float32]:
     """The tokens of `to_blob`, shape (views, D)."""
     return np.frombuffer(blob, BLOB_TYPE).reshape(views, -1).astype(np.float32, copy=False)
+
+
+def patches_to_blob(patches: NDArray[np.floating]) -> bytes:
+    """Patch tokens, shape (V, K, D), as bytes."""
+    return np.ascontiguousarray(patches, dtype=PATCH_TYPE).tobytes()
+
+
+def patches_from_blob(blob: bytes, views: int, dim: int) -> NDArray[np.floating]:
+    """The tokens of `patches_to_blob`, shape (views, K, dim)."""
+    return np.frombuffer(blob, PATCH_TYPE).reshape(views, -1, dim)

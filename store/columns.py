@@ -67,9 +67,7 @@ def request_from_json(text: str) -> ScanRequest:
 
 def decision_to_json(decision: Decision) -> str:
     """One TEXT column."""
-    return json.dumps(
-        {"outcome": decision.outcome, "score": decision.score, "threshold": decision.threshold, "similarities": decision.similarities}
-    )
+    return json.dumps(vars(decision))
 
 
 def decision_from_json(text: str) -> Decision:

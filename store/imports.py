@@ -15,7 +15,7 @@ from core.errors import Conflict, InvalidInput, OneLookError, Unavailable
 from core.reference import Reference
 from store import untrusted
 from store.archive import FILE_NAME, MANIFEST, CategoryEntry, Manifest, token_name
-from store.arrays import BLOB_TYPE, arrays_file
+from store.arrays import BLOB_TYPE, arrays_file, patches_from_blob
 from store.audit import record
 from store.bursts import read_burst
 from store.categories import insert_category
@@ -218,6 +218,9 @@ def _instances(part: CategoryEntry, category_id: str, tokens: bytes, dim: int) -
         for column in ("cls", "pooled"):
             tokens_of = np.frombuffer(blobs[column], BLOB_TYPE).reshape(instance.views, dim)
             _require(bool(np.isfinite(tokens_of).all()), f"{column} of instance {index} is finite")
+        if blobs["patches"] is not None:
+            patches = patches_from_blob(blobs["patches"], instance.views, dim)
+            _require(patches.shape[1] > 0 and bool(np.isfinite(patches).all()), f"the patches of instance {index} are finite")
         pictures = f"categories/{category_id}" if instance.of_reference else None
         rows.append(
             instance.model_dump(exclude={"of_reference"}) | blobs | {"id": new_id(), "category_id": category_id, "pictures": pictures}

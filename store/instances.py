@@ -14,9 +14,10 @@ from sqlite_utils import Database
 
 from core.encode import EncodedBurst
 from core.errors import Conflict, NotFound, Unavailable
+from core.evidence import sample_patches
 from core.novelty import Member
 from core.views import Burst
-from store.arrays import Array, from_blob, to_blob
+from store.arrays import Array, from_blob, patches_from_blob, patches_to_blob, to_blob
 from store.audit import record
 from store.bursts import read_burst
 from store.connection import Connection, Row, new_id, only
@@ -25,10 +26,10 @@ from store.retention import now
 
 COLUMNS = "i.id, i.category_id, i.created_at, i.source, i.source_id, i.how, i.similarity, i.views, i.pictures"
 LIVING = "FROM instances i JOIN categories c ON c.id = i.category_id WHERE i.removed_by IS NULL AND c.removed_by IS NULL"
-TOKENS = ("cls", "pooled")
+TOKENS = ("cls", "pooled", "patches")
 """The columns that hold them."""
-Tokens = tuple[Array, Array]
-"""[CLS] and pooled, shapes (V, D)."""
+Tokens = tuple[Array, Array, Array | None]
+"""[CLS] and pooled, shapes (V, D), and patches, shape (V, K, D), where they were kept."""
 log = logging.getLogger("onelook.store")
 
 
@@ -86,7 +87,7 @@ class Instances:
         new = json.dumps(sorted(wanted - kept.keys()))
         query = f"SELECT id, views, {', '.join(TOKENS)}, tokens_sha256 FROM instances WHERE id IN (SELECT value FROM json_each(?))"
         for row in self._connection.rows(query, new):
-            kept[row["id"]] = None if damaged(row) else (from_blob(row["cls"], row["views"]), from_blob(row["pooled"], row["views"]))
+            kept[row["id"]] = None if damaged(row) else _tokens(row)
             if kept[row["id"]] is None:
                 log.warning("the tokens of instance %s are damaged and left out; `onelook memory check` says more", row["id"])
         self._tokens = kept
@@ -103,9 +104,18 @@ def tokens_sha256(row: Row) -> str:
     return hashlib.sha256(b"".join(row[name] or b"" for name in TOKENS)).hexdigest()
 
 
+def _tokens(row: Row) -> Tokens:
+    cls, pooled = (from_blob(row[name], row["views"]) for name in ("cls", "pooled"))
+    return cls, pooled, None if row["patches"] is None else patches_from_blob(row["patches"], *cls.shape)
+
+
 def token_columns(encoded: EncodedBurst) -> Row:
     """The columns of an instance that a backbone computed."""
-    row: Row = {name: to_blob(getattr(encoded, name)) for name in TOKENS}
+    row: Row = {
+        "cls": to_blob(encoded.cls),
+        "pooled": to_blob(encoded.pooled),
+        "patches": patches_to_blob(sample_patches(encoded)),
+    }
     return row | {"views": len(encoded.cls), "tokens_sha256": tokens_sha256(row)}
 
 

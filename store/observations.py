@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 from sqlite_utils import Database
 
 from core.encode import EncodedBurst
@@ -54,6 +55,8 @@ class Answer:
     scan_error: str | None
     timings_ms: Mapping[str, float]
     grounds: Grounds | None = None
+    viewpoints: Array | None = None
+    """Of an uncertain object where to look next, world_from_camera, shape (n, 4, 4)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,6 +134,11 @@ class Observations:
         rows = self._connection.rows(f"{SELECT} WHERE {where} ORDER BY o.rowid DESC LIMIT ?", *wanted.values(), limit)
         return [_observation(row) for row in rows]
 
+    def decisions(self, limit: int) -> list[Decision]:
+        """The latest decisions, newest first."""
+        rows = self._connection.rows("SELECT decision FROM observations WHERE decision IS NOT NULL ORDER BY rowid DESC LIMIT ?", limit)
+        return [decision_from_json(row["decision"]) for row in rows]
+
     def get(self, observation_id: str) -> Observation:
         """Raises NotFound."""
         row = only(self._connection.rows(f"{SELECT} WHERE o.id = ?", observation_id))
@@ -184,6 +192,7 @@ def _row(observation_id: str, answer: Answer, views: int, files: Files) -> Row:
         "pose_error": answer.pose_error,
         "scan_error": answer.scan_error,
         "timings_ms": json.dumps(dict(answer.timings_ms)),
+        "viewpoints": None if answer.viewpoints is None else json.dumps(answer.viewpoints.tolist()),
         "features_sha256": arrays_file(files)[1].sha256,
         "files": files_to_json(files),
         "grounds": grounds_to_json(answer.grounds) if answer.grounds else None,
@@ -206,4 +215,5 @@ def _observation(row: Row) -> Observation:
         json.loads(row["timings_ms"]),
         row["features_sha256"],
         grounds_from_json(row["grounds"]) if row["grounds"] else None,
+        np.array(json.loads(row["viewpoints"])).reshape(-1, 4, 4) if row["viewpoints"] else None,
     )

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from core.affine9 import Affine9
 from core.boxes import OrientedBox
@@ -180,3 +181,5 @@ class Observation:
     features_sha256: str
     grounds: Grounds | None
     """How much the answer rests on; None where an earlier version did not record it."""
+    viewpoints: NDArray[np.floating] | None = None
+    """Of an uncertain object where to look next, world_from_camera in the burst's world, most telling first, shape (n, 4, 4)."""

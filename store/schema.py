@@ -182,5 +182,12 @@ def m003_grounds(db: Database) -> None:
     db.table("observations").add_column("grounds", str)
 
 
+@migrations()
+def m004_decisions(db: Database) -> None:
+    """Patch tokens of each view, which decisions compare; instances from before have none and take no part. Where to look next."""
+    db.table("instances").add_column("patches", bytes)
+    db.table("observations").add_column("viewpoints", str)
+
+
 def _reference(table: str, column: str, other_table: str, on_delete: str) -> ForeignKey:
     return ForeignKey(table, column, other_table, "id", on_delete=on_delete)

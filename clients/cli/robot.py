@@ -83,6 +83,8 @@ def _facts(seen: Observation) -> dict[str, object]:
     if seen.similarities:
         limit = "" if seen.threshold is None else f", threshold {seen.threshold:.3f}"
         facts["similarity"] = f"{seen.similarities[0].similarity:.3f}{limit}"
+    if seen.probability is not None:
+        facts["probability"] = f"{seen.probability:.2f} that it is of the most similar category"
     if seen.pose is not None:
         facts["scale"] = f"{seen.pose.scale:.3f} of the reference"
         facts["centre"] = ", ".join(f"{value:.3f}" for value in seen.pose.object_in_world[:3, 3]) + " m in the burst's world frame"

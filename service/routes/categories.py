@@ -81,7 +81,7 @@ def delete_instance(category_id: str, instance_id: str, agent: AgentDep, actor: 
 @router.get("/{category_id}/similarity", responses=problems(404, 422, 503))
 def category_similarity(category_id: str, agent: AgentDep) -> CategorySimilarities:
     """How like each other its bursts are, and how like it the other categories."""
-    return CategorySimilarities.of(agent.curation.similarities(category_id), agent.names(), agent.config.score, agent.threshold)
+    return CategorySimilarities.of(agent.curation.similarities(category_id), agent.names())
 
 
 @router.get("/{category_id}/views/{view}/rgb.png", response_class=Response, responses=PNG_RESPONSES)

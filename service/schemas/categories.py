@@ -7,6 +7,7 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from core.novelty import SCORES
 from service.curation import Similarities
 from service.schemas.geometry import Vector3
 from store import records
@@ -113,17 +114,17 @@ class CategorySimilarities(BaseModel):
     """How like each other a category's bursts are, and how like it the other categories: what to merge and what to split."""
 
     score: str = Field(description="By which it is told.", examples=["pooled_best_view"])
-    threshold: float = Field(description="Least similarity of a known object.")
+    threshold: float = Field(description="Usual least similarity of bursts of one category, by that score.")
     instance_ids: list[str] = Field(description="Oldest first.")
     matrix: list[list[float]] = Field(description="Similarity of each pair of instances, in their order.")
     categories: list[OtherCategory] = Field(description="The others, most similar first.")
 
     @staticmethod
-    def of(found: Similarities, names: Mapping[str, str | None], score: str, threshold: float) -> CategorySimilarities:
+    def of(found: Similarities, names: Mapping[str, str | None]) -> CategorySimilarities:
         """From the agent's answer; `names` are the categories' by id."""
         return CategorySimilarities(
-            score=score,
-            threshold=threshold,
+            score=found.score,
+            threshold=SCORES[found.score].threshold,
             instance_ids=[instance.id for instance in found.instances],
             matrix=found.matrix.tolist(),
             categories=[OtherCategory(category_id=each, name=names.get(each), similarity=value) for each, value in found.categories],

@@ -30,10 +30,13 @@ class ObserveQuery(BaseModel):
 
     category_id: str | None = Field(None, description="Takes the object for one of this category and skips the decision.")
     threshold: float | None = Field(None, allow_inf_nan=False, description="Least similarity of a known object, for this request.")
+    false_known_rate: float | None = Field(
+        None, gt=0, le=0.5, description="Of objects of no known category, the share that may be called known, for this request."
+    )
     views_used: int | None = Field(None, ge=1, description="Uses only this many of the burst's views, the first ones.")
     learn: bool = Field(
         True,
-        description="A known object's burst joins its category, for later decisions; false leaves what is known as it is.",
+        description="A known object's burst joins its category where the evidence is strong; false leaves what is known as it is.",
     )
     up: Direction | None = Field(
         None, description="For the scan of a novel object: away from the support, `up=0&up=0&up=1`; told from the cameras where left out."
@@ -52,7 +55,15 @@ class ObserveQuery(BaseModel):
         """As the agent has them."""
         pose = PoseOptions(self.dims, self.method, self.consensus_deg, self.inlier_ratio, self.estimator, self.dof)
         return ObserveOptions(
-            self.category_id, self.threshold, self.variant, pose, self.alternatives, self.learn, as_up(self.up), self.seed
+            self.category_id,
+            self.threshold,
+            self.false_known_rate,
+            self.variant,
+            pose,
+            self.alternatives,
+            self.learn,
+            as_up(self.up),
+            self.seed,
         )
 
 
@@ -172,7 +183,22 @@ class Observation(BaseModel):
     name: str | None = Field(description="That category's name.")
     score: str | None = Field(description="The score behind the decision; null where the request named the category.")
     threshold: float | None = Field(description="Least similarity of a known object in this decision.")
-    similarities: list[CategorySimilarity] = Field(description="Every category compared with, most similar first.")
+    similarities: list[CategorySimilarity] = Field(
+        description="Categories, most similar first; with the score `best` those few that match best."
+    )
+    similarity: float | None = Field(description="Of the most similar category.")
+    margin: float | None = Field(description="By how much the most similar category leads the next.")
+    uncertain_above: float | None = Field(description="Similarities between it and `threshold` are answered `uncertain`.")
+    learn_above: float | None = Field(description="A known object joins its category above it: more than an answer needs.")
+    probability: float | None = Field(
+        description="Estimated, that the most similar category is right, at even odds beforehand; null for scores but `best`."
+    )
+    verified: bool = Field(description="Whether poses were tried to decide; that takes depth and cameras.")
+    candidates: list[str] = Field(description="Categories that an uncertain object may be of; it may also be novel.")
+    viewpoints: list[list[list[float]]] | None = Field(
+        description="Of an uncertain object: world_from_camera of where to look next, the most telling first. "
+        "Send the burst again with a view from there."
+    )
     pose: Pose | None = Field(description="Of a known object.")
     pose_error: str | None = Field(description="Why a known object has no pose.")
     scan: scans.Scan | None = Field(description="Of a novel object: the views to take so that it becomes a category.")
@@ -203,6 +229,14 @@ class Observation(BaseModel):
             threshold=decision.threshold if decision else None,
             similarities=[CategorySimilarity(**each) for each in similarities],
             pose=Pose.of(observation.pose, observation.frame) if observation.pose else None,
+            similarity=decision.similarity if decision else None,
+            margin=decision.margin if decision else None,
+            uncertain_above=decision.uncertain_above if decision else None,
+            learn_above=decision.learn_above if decision else None,
+            probability=decision.probability if decision else None,
+            verified=decision.verified if decision else False,
+            candidates=list(decision.candidates) if decision and observation.outcome == "uncertain" else [],
+            viewpoints=None if observation.viewpoints is None else observation.viewpoints.tolist(),
             pose_error=observation.pose_error,
             scan=scan,
             scan_error=observation.scan_error,

@@ -9,7 +9,7 @@ import pytest
 
 from benchmarks.pair_scores import PairScores, auroc
 from core.errors import InvalidInput
-from core.novelty import SCORES, Member, decide
+from core.novelty import SCORES, DecisionConfig, Member, decide
 
 
 @pytest.fixture
@@ -23,7 +23,7 @@ def bursts() -> list[SimpleNamespace]:
 def test_a_set_is_as_similar_as_the_service_says(bursts: list[SimpleNamespace], score: str) -> None:
     pairs, members, target = PairScores.of(bursts, score), [0, 1, 3], 4
     memory = [Member("it", bursts[index].cls, bursts[index].pooled) for index in members]
-    ((_, expected),) = decide(memory, bursts[target], score=score).similarities
+    ((_, expected),) = decide(memory, bursts[target], DecisionConfig(score)).similarities
     total, best = pairs.total[members, target].sum(), pairs.best[members, target].max(axis=0)
     assert pairs.similarity(total, best, pairs.views[members].sum(), target) == pytest.approx(expected, rel=1e-5)
 
@@ -33,7 +33,7 @@ def test_a_single_burst_is_as_similar_as_the_service_says(bursts: list[SimpleNam
     single = PairScores.of(bursts, score).single()
     memory = [Member(str(index), burst.cls, burst.pooled) for index, burst in enumerate(bursts)]
     for target, burst in enumerate(bursts):
-        for name, expected in decide(memory, burst, score=score).similarities:
+        for name, expected in decide(memory, burst, DecisionConfig(score)).similarities:
             assert single[int(name), target] == pytest.approx(expected, rel=1e-5)
 
 

@@ -9,7 +9,8 @@ import pytest
 
 from core.encode import EncodedBurst
 from core.errors import InvalidInput
-from core.novelty import SCORES, Member, best_view, decide, paper_mean, paper_sum
+from core.evidence import PATCHES
+from core.novelty import SCORES, Context, DecisionConfig, Member, best_view, decide, paper_mean, paper_sum
 from core.sim3 import Sim3
 
 from .conftest import PaintedObject
@@ -47,19 +48,116 @@ def test_an_empty_memory_finds_everything_novel(painted: PaintedObject) -> None:
 def test_the_most_similar_category_is_chosen_above_the_threshold(score: str, painted: PaintedObject) -> None:
     kind, other = np.eye(2, 48), np.eye(48)[5:7]
     memory = [Member("kind", kind, kind), Member("other", other, other)]
-    known = decide(memory, burst_of(painted, kind), score=score, threshold=0.1)
+    known = decide(memory, burst_of(painted, kind), DecisionConfig(score, 0.1))
     assert known.outcome == "known"
     assert known.similarities[0][0] == "kind"
-    assert decide(memory, burst_of(painted, kind), score=score, threshold=1e9).outcome == "novel"
+    assert decide(memory, burst_of(painted, kind), DecisionConfig(score, 1e9)).outcome == "novel"
 
 
 def test_all_bursts_of_a_category_count_as_one_set(painted: PaintedObject) -> None:
     first, second = np.eye(1, 48), np.eye(48)[1:2]
     memory = [Member("kind", first, first), Member("kind", second, second)]
-    similarities = decide(memory, burst_of(painted, first), score="paper_sum").similarities
+    similarities = decide(memory, burst_of(painted, first), DecisionConfig("paper_sum")).similarities
     assert similarities == (("kind", 1.0),)
 
 
 def test_an_unknown_score_is_named(painted: PaintedObject) -> None:
     with pytest.raises(InvalidInput, match="paper_mean"):
-        decide([], burst_of(painted, np.eye(1, 48)), score="nonsense")
+        decide([], burst_of(painted, np.eye(1, 48)), DecisionConfig("nonsense"))
+
+
+ROOM = np.random.default_rng(1).normal(size=(12, 384))
+"""Directions of tokens, one a kind of thing."""
+
+
+def kind_of_tokens(kind: int, seed: int, views: int = 4) -> np.ndarray:
+    """Patches, shape (V, K, D), of an instance: its kind's tokens, somewhat its own, view by view."""
+    rng = np.random.default_rng([kind, seed])
+    own = ROOM[kind] + 0.6 * rng.normal(size=384)
+    return own + 0.6 * rng.normal(size=(views, PATCHES, 384))
+
+
+def member(kind: int, seed: int) -> Member:
+    tokens = kind_of_tokens(kind, seed)
+    return Member(f"kind {kind}", tokens.mean(axis=1), tokens.mean(axis=1), tokens)
+
+
+def seen(painted: PaintedObject, kind: int, seed: int, views: int = 4) -> EncodedBurst:
+    view = painted.encode(1, Sim3.identity()).views[0]
+    cells = np.zeros((PATCHES, 2), np.int16)
+    made = [
+        replace(view, cells=cells, descriptors=each.astype(np.float32), pooled=each.mean(axis=0), cls=each.mean(axis=0))
+        for each in kind_of_tokens(kind, seed, views)
+    ]
+    return EncodedBurst(tuple(made), "painted")
+
+
+SIX_KINDS = [member(kind, seed) for kind in range(6) for seed in range(2)]
+
+
+def test_best_knows_other_instances_and_finds_other_kinds_novel(painted: PaintedObject) -> None:
+    known = [decide(SIX_KINDS, seen(painted, kind, 9)) for kind in range(6)]
+    assert [decision.outcome for decision in known] == ["known"] * 6
+    assert [decision.similarities[0][0] for decision in known] == [f"kind {kind}" for kind in range(6)]
+    assert {decide(SIX_KINDS, seen(painted, kind, 9)).outcome for kind in range(6, 12)} <= {"novel", "uncertain"}
+
+
+def test_evidence_does_not_depend_on_how_often_a_view_is_sent(painted: PaintedObject) -> None:
+    burst = seen(painted, 2, 9)
+    twice = EncodedBurst(burst.views + burst.views, "painted")
+    once, again = decide(SIX_KINDS, burst), decide(SIX_KINDS, twice)
+    # The patches of each copy are drawn by the same generator, one view after the other, so they are not the very same.
+    assert again.similarity == pytest.approx(once.similarity, abs=0.02)
+
+
+def test_verification_adds_evidence_for_the_shortlist_only(painted: PaintedObject) -> None:
+    asked: list[str] = []
+
+    def verify(category: str) -> float:
+        asked.append(category)
+        return 1.0 if category == "kind 2" else 0.0
+
+    burst = seen(painted, 2, 9)
+    plain, verified = decide(SIX_KINDS, burst), decide(SIX_KINDS, burst, context=Context(verify=verify))
+    assert len(asked) == 3
+    assert "kind 2" in asked
+    assert (plain.verified, verified.verified) == (False, True)
+    assert verified.similarity > plain.similarity
+    assert verified.margin > plain.margin
+
+
+def test_a_stricter_rate_asks_for_more_and_learning_for_more_still(painted: PaintedObject) -> None:
+    lax, strict = (decide(SIX_KINDS, seen(painted, 2, 9), DecisionConfig(false_known_rate=rate)) for rate in (0.05, 0.001))
+    assert lax.uncertain_above < lax.threshold < lax.learn_above
+    assert lax.threshold < strict.threshold
+    assert lax.similarity == strict.similarity
+
+
+def test_between_the_levels_the_answer_is_uncertain_and_names_candidates(painted: PaintedObject) -> None:
+    burst = seen(painted, 2, 9)
+    clear = decide(SIX_KINDS, burst)
+    rates = np.geomspace(1e-9, 0.5, 60)
+    outcomes = [decide(SIX_KINDS, burst, DecisionConfig(false_known_rate=rate)).outcome for rate in rates]
+    assert outcomes == sorted(outcomes, key=["novel", "uncertain", "known"].index)
+    assert {"uncertain", "known"} <= set(outcomes)
+    unsure = decide(SIX_KINDS, burst, DecisionConfig(false_known_rate=rates[outcomes.index("uncertain")]))
+    assert unsure.candidates[0] == clear.similarities[0][0] == "kind 2"
+    assert unsure.rival is None
+
+
+def test_the_rival_of_a_known_object_is_of_another_category(painted: PaintedObject) -> None:
+    decision = decide(SIX_KINDS, seen(painted, 2, 9))
+    assert decision.outcome == "known"
+    # Without the right category none matches the burst well, so the best of the others stands out more than beside it.
+    assert decision.similarities[1][1] < decision.rival < decision.similarities[0][1]
+
+
+def test_a_threshold_of_the_callers_own_leaves_no_third_answer(painted: PaintedObject) -> None:
+    decision = decide(SIX_KINDS, seen(painted, 2, 9), DecisionConfig(threshold=5.0))
+    assert (decision.outcome, decision.threshold, decision.uncertain_above) == ("novel", 5.0, 5.0)
+
+
+@pytest.mark.parametrize("rate", [0.0, 0.6, -1.0, float("nan")])
+def test_an_impossible_rate_is_refused(rate: float) -> None:
+    with pytest.raises(InvalidInput, match="false_known_rate"):
+        DecisionConfig(false_known_rate=rate)

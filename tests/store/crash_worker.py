@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 
 from core.encode import EncodedBurst
-from core.novelty import decide
+from core.novelty import DecisionConfig, decide
 from core.reference import Reference
 from core.views import Burst
 from store.columns import files_from_json
@@ -42,7 +42,7 @@ Known = dict[str, list[Any]]
 def state(memory: Memory, asked: EncodedBurst) -> Known:
     """What the memory knows and how it answers."""
     names = {category.id: category for category in memory.categories.all()}
-    found = decide(memory.categories.members(), asked).similarities
+    found = decide(memory.categories.members(), asked, DecisionConfig("pooled_best_view")).similarities
     return {str(names[each].name): [names[each].instances, similarity] for each, similarity in found}
 
 

@@ -11,7 +11,7 @@ import pytest
 from core.backbones.base import Backbone
 from core.encode import EncodedBurst, Encoder
 from core.errors import Conflict, Unavailable
-from core.novelty import decide
+from core.novelty import DecisionConfig, decide
 from core.packing import burst_as_arrays
 from core.reference import build_reference
 from core.scan import look_at
@@ -85,7 +85,7 @@ def test_everything_is_what_the_other_backbone_makes(learnt: Memory, category: C
     reference = learnt.categories.reference(category.id)
     assert reference.fingerprint == "hue-1"
     np.testing.assert_allclose(reference.views[0].descriptors, expected.views[0].descriptors, atol=2e-3)
-    assert decide(learnt.categories.members(), expected).outcome == "known"
+    assert decide(learnt.categories.members(), expected, DecisionConfig("pooled_best_view")).outcome == "known"
     (seen,) = learnt.observations.latest(1)
     assert str(learnt.observations.features(seen.id)["fingerprint"]) == "hue-1"
 
@@ -178,9 +178,9 @@ def test_the_views_it_read_are_untouched(learnt: Memory, category: Category, oth
 
 def test_tokens_of_the_first_backbone_are_not_remembered(learnt: Memory, other: Backbone, cup: Burst, backbone: Backbone) -> None:
     before: EncodedBurst = Encoder(backbone).encode(cup)
-    assert decide(learnt.categories.members(), before).similarities[0][1] > 0.99
+    assert decide(learnt.categories.members(), before, DecisionConfig("pooled_best_view")).similarities[0][1] > 0.99
     learnt.reembed(other, burst_as_arrays)
-    assert decide(learnt.categories.members(), before).similarities[0][1] < 0.9
+    assert decide(learnt.categories.members(), before, DecisionConfig("pooled_best_view")).similarities[0][1] < 0.9
 
 
 def test_an_observation_that_cannot_be_computed_goes_with_its_burst(learnt: Memory, category: Category, other: Backbone) -> None:

@@ -1,0 +1,128 @@
+"""The score `best` over episodes: evidence as `core.evidence` and `core.novelty` make it, from tables of all pairs.
+
+Letters: T memories side by side, C categories (room for them), H bursts held, S shortlisted categories, N bursts, G stages of the centre.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.matches import STAGES
+from core.calibration import Prior
+from core.evidence import SHORTLIST, cohort_level
+from core.novelty import VERIFIED
+
+FloatArray = NDArray[np.floating[Any]]
+IntArray = NDArray[np.intp]
+
+
+@dataclass(frozen=True, eq=False)
+class BestPairs:
+    """Tables of all pairs of bursts."""
+
+    match: FloatArray
+    """Patch matches at each stage, shape (G, N, N)."""
+    agreement: FloatArray | None
+    """Of reference i with burst j at the best pose, shape (N, N); None where poses take no part."""
+    prior: Prior
+
+    def single(self) -> FloatArray:
+        """Evidence of every burst alone for every burst, shape (N, N), as if each were a category of its own."""
+        match = self.match[-1]
+        others = np.where(np.eye(len(match), dtype=bool), -np.inf, match)
+        level = cohort_level(others, self.prior.cohort)
+        evidence = match - (level[:, None] + level[None, :]) / 2
+        return evidence if self.agreement is None else evidence + self.prior.agreement_weight * self.agreements()
+
+    def agreements(self) -> FloatArray:
+        """Agreement of reference i with burst j, shape (N, N): 1 with itself, 0 where it has no pose."""
+        assert self.agreement is not None
+        return np.where(np.eye(len(self.agreement), dtype=bool), 1.0, np.nan_to_num(self.agreement))
+
+
+class BestSource:
+    """See `benchmarks.episodes.Source`. A category is represented to others by its founder, whose reference is also what poses verify."""
+
+    def __init__(self, pairs: BestPairs, room: int) -> None:
+        self._pairs, self._room = pairs, room
+        self._agreement = None if pairs.agreement is None else pairs.agreements() * pairs.prior.agreement_weight
+
+    def begin(self, thresholds: int) -> None:
+        """See `Source`."""
+        bursts = self._pairs.match.shape[1]
+        self._of = np.full((thresholds, bursts), -1, dtype=np.intp)
+        self._founder = np.zeros((thresholds, self._room), dtype=np.intp)
+        self._best = np.full((len(STAGES), thresholds, self._room, bursts), -np.inf, dtype=np.float32)
+        self._held: list[int] = []
+
+    def nearest(self, burst: int, used: IntArray) -> tuple[IntArray, FloatArray]:
+        """See `Source`."""
+        categories, evidence = self.ranked(burst, used, np.full(len(used), -1))
+        return categories[:, 0], evidence[:, 0]
+
+    def ranked(self, burst: int, used: IntArray, without: IntArray, verify: IntArray | None = None) -> tuple[IntArray, FloatArray]:
+        """Shortlisted categories and their evidence, most first, shapes (T, S), (T, S); −inf where there are fewer.
+
+        Args:
+            used: number of categories, shape (T,).
+            without: a category of each memory that is left out, −1 for none, shape (T,).
+            verify: the only categories whose poses take part, shape (T, VERIFIED), else those with the most evidence.
+        """
+        most = max(int(used.max()), 1)
+        there = (np.arange(most) < used[:, None]) & (np.arange(most) != without[:, None])
+        stage = int(np.searchsorted(STAGES, len(self._held), side="right")) - 1
+        raw = np.where(there, self._best[stage, :, :most, burst], -np.inf)
+        shortlist = np.argsort(-raw, axis=1, kind="stable")[:, :SHORTLIST]
+        match = np.take_along_axis(raw, shortlist, axis=1)
+        levels = self._levels(stage, burst, shortlist, there)
+        evidence = np.where(np.isfinite(match), match - levels / 2, -np.inf)
+        if self._agreement is not None:
+            evidence = evidence + self._verification(burst, shortlist, evidence, verify)
+        order = np.argsort(-evidence, axis=1, kind="stable")
+        return np.take_along_axis(shortlist, order, axis=1), np.take_along_axis(evidence, order, axis=1)
+
+    def learn(self, burst: int, chosen: IntArray, rows: IntArray) -> None:
+        """See `Source`."""
+        new = ~(self._of[rows] == chosen[:, None]).any(axis=1)
+        self._founder[rows[new], chosen[new]] = burst
+        self._best[:, rows, chosen] = np.maximum(self._best[:, rows, chosen], self._pairs.match[:, None, burst])
+        self._of[rows, burst] = chosen
+        if len(rows) and burst not in self._held:
+            self._held.append(burst)
+
+    def _levels(self, stage: int, burst: int, shortlist: IntArray, there: NDArray[np.bool_]) -> FloatArray:
+        """What burst and most similar member reach with the founders of other categories, summed, shape (T, S)."""
+        match, founder = self._pairs.match[stage], self._founder[:, : there.shape[1]]
+        held = np.array(self._held, dtype=np.intp)
+        if not len(held):
+            return np.zeros(shortlist.shape)
+        to_burst = np.where(there, match[founder, burst], -np.inf)
+        own = np.where(self._of[:, None, held] == shortlist[:, :, None], match[held, burst], -np.inf)  # (T, S, H)
+        member = held[own.argmax(axis=2)]
+        total = np.zeros(shortlist.shape)
+        for slot in range(shortlist.shape[1]):
+            apart = np.arange(there.shape[1]) != shortlist[:, slot, None]
+            to_member = np.where(there, match[founder, member[:, slot, None]], -np.inf)
+            for reached in (to_burst, to_member):
+                total[:, slot] += cohort_level(np.where(apart, reached, -np.inf), self._pairs.prior.cohort)
+        return total
+
+    def _verification(self, burst: int, shortlist: IntArray, evidence: FloatArray, verify: IntArray | None) -> FloatArray:
+        assert self._agreement is not None
+        gained = self._agreement[np.take_along_axis(self._founder, shortlist, axis=1), burst]
+        if verify is None:
+            place = np.argsort(np.argsort(-evidence, axis=1, kind="stable"), axis=1)
+            return np.where(place < VERIFIED, gained, 0.0)
+        return np.where((shortlist[:, :, None] == verify[:, None, :]).any(axis=2), gained, 0.0)
+
+    def verified(self, burst: int, used: IntArray) -> IntArray:
+        """The categories whose poses a decision tries, shape (T, VERIFIED)."""
+        kept, self._agreement = self._agreement, None
+        try:
+            return self.ranked(burst, used, np.full(len(used), -1))[0][:, :VERIFIED]
+        finally:
+            self._agreement = kept

@@ -1,0 +1,112 @@
+"""Episodes as the service lives them: the threshold comes from a rate and from what the memory holds, and there is a third answer.
+
+A known burst joins only above the stricter level; an uncertain one changes nothing. The rate is about objects of no known category, so
+they are what it is tested on: the share of them that were called known. The first burst of an episode meets an empty memory and is
+not counted.
+
+Letters: E episodes, T rates, L bursts an episode presents, N bursts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.best_pairs import BestPairs, BestSource, FloatArray, IntArray
+from core.calibration import Calibration, Samples
+from core.novelty import LEARN_FACTOR, UNCERTAIN_FACTOR
+
+RATES = (0.005, 0.01, 0.02, 0.05)
+"""False-known rates asked for."""
+
+
+@dataclass(frozen=True, eq=False)
+class Answers:
+    """Numbers of bursts, repeats left out, each of shape (E, T)."""
+
+    unknown: IntArray
+    """Of no category that the memory holds."""
+    false_known: IntArray
+    """Of those, called known."""
+    unknown_uncertain: IntArray
+    """Of those, called uncertain."""
+    holding: IntArray
+    """Of a category that the memory holds."""
+    missed: IntArray
+    """Of those, called novel."""
+    mistaken: IntArray
+    """Of those, called known as a category whose majority is of another kind."""
+    holding_uncertain: IntArray
+    """Of those, called uncertain."""
+    categories: IntArray
+    """In the memory at the end."""
+
+    def __add__(self, other: Answers) -> Answers:
+        return Answers(*(np.concatenate([getattr(self, each.name), getattr(other, each.name)]) for each in fields(self)))
+
+
+def episode(pairs: BestPairs, labels: NDArray[np.intp], order: Sequence[int], rates: Sequence[float] = RATES) -> Answers:
+    """One episode over the bursts at `order`, for every rate side by side."""
+    rows, used = np.arange(len(rates)), np.zeros(len(rates), dtype=np.intp)
+    kind = pairs.prior.of(pairs.agreement is not None)
+    rivals: list[list[float]] = [[] for _ in rates]
+    votes = np.zeros((len(rates), len(order), int(labels.max()) + 1), dtype=np.intp)
+    counts = {each.name: np.zeros(len(rates), dtype=np.intp) for each in fields(Answers)}
+    source = BestSource(pairs, len(order))
+    source.begin(len(rates))
+    met: set[int] = set()
+    for position, burst in enumerate(order):
+        label = int(labels[burst])
+        threshold, uncertain_above, learn_above = _levels(rivals, rates, kind)
+        chosen, evidence = source.nearest(burst, used)
+        known = evidence > threshold
+        uncertain = ~known & (evidence > uncertain_above)
+        novel = ~known & ~uncertain
+        if position and burst not in met:
+            held = votes[:, :, label].any(axis=1)
+            joined = votes[rows, chosen]
+            wrong = known & (joined[:, label] < joined.max(axis=1))
+            for name, which in (
+                ("unknown", ~held),
+                ("false_known", ~held & known),
+                ("unknown_uncertain", ~held & uncertain),
+                ("holding", held),
+                ("missed", held & novel),
+                ("mistaken", held & wrong),
+                ("holding_uncertain", held & uncertain),
+            ):
+                counts[name] += which
+        best_wrong = _best_wrong(source, burst, used, chosen, known, evidence)
+        for row in np.flatnonzero(~uncertain & np.isfinite(best_wrong)):
+            rivals[row].append(float(best_wrong[row]))
+        learnt = np.flatnonzero(novel | (evidence > learn_above))
+        place = np.where(novel, used, chosen)[learnt]
+        votes[learnt, place, label] += 1
+        source.learn(burst, place, learnt)
+        used = used + novel
+        met.add(burst)
+    counts["categories"] = used
+    return Answers(**{name: each[None] for name, each in counts.items()})
+
+
+def _best_wrong(
+    source: BestSource, burst: int, used: IntArray, chosen: IntArray, known: NDArray[np.bool_], evidence: FloatArray
+) -> FloatArray:
+    """Evidence for the best category that is wrong as far as the decision tells, shape (T,)."""
+    if not known.any():
+        return evidence
+    _, others = source.ranked(burst, used, np.where(known, chosen, -1), source.verified(burst, used))
+    return np.where(known, others[:, 0], evidence)
+
+
+def _levels(rivals: Sequence[Sequence[float]], rates: Sequence[float], prior: Samples) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Threshold, lower and learning level of each rate, each (T,)."""
+    levels = []
+    for values, rate in zip(rivals, rates):
+        calibration = Calibration.fit(values, prior)
+        levels.append([calibration.threshold(min(factor * rate, 0.5)) for factor in (1.0, UNCERTAIN_FACTOR, LEARN_FACTOR)])
+    first, second, third = np.array(levels).T
+    return first, second, third

@@ -1,0 +1,62 @@
+"""Patch matches between every two bursts, with patches centred as a memory of a few bursts, and of many, would centre them.
+
+Letters: N bursts, S stages.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import core
+from benchmarks.parallel import bar
+from core.backbones.weights import cache_folder
+from core.backbones.whitening import Whitening
+from core.encode import EncodedBurst
+from core.evidence import centre, directions, match_views, sample_patches, whitened
+
+FloatArray = NDArray[np.floating[Any]]
+STAGES = (0, 8, 32)
+"""Bursts that a memory holds at least for a stage; with fewer than the second it has the shipped centre."""
+
+
+def matches(bursts: Sequence[EncodedBurst], whitening: Whitening | None, folder: Path | None = None) -> FloatArray:
+    """Match of bursts i and j, shape (S, N, N), symmetric; kept in the user's cache.
+
+    A stage's centre comes from as many bursts, drawn at random: in an episode they would be those that came first.
+    """
+    patches = [whitened(sample_patches(burst), whitening) for burst in bursts]
+    file = (folder or cache_folder() / "matches") / f"{_key(patches)}.npy"
+    if not file.exists():
+        file.parent.mkdir(parents=True, exist_ok=True)
+        order = np.random.default_rng(0).permutation(len(patches))
+        centres = [centre([patches[index] for index in order[:count]]) if count else np.zeros(patches[0].shape[-1]) for count in STAGES]
+        with bar() as progress:
+            task = progress.add_task("matching patches", total=len(centres) * len(patches))
+            table = np.stack([_table(patches, middle, lambda: progress.advance(task)) for middle in centres])
+        partial = file.with_suffix(".partial")
+        with partial.open("wb") as stream:
+            np.save(stream, table)
+        partial.replace(file)
+    return np.asarray(np.load(file))
+
+
+def _table(patches: list[FloatArray], middle: FloatArray, advance: Callable[[], None]) -> FloatArray:
+    unit = [directions(each, middle) for each in patches]
+    table = np.zeros((len(unit), len(unit)))
+    for row, each in enumerate(unit):
+        table[row, row:] = table[row:, row] = match_views(each, unit[row:])
+        advance()
+    return table
+
+
+def _key(patches: list[FloatArray]) -> str:
+    digest = hashlib.sha256((Path(core.__file__).parent / "evidence.py").read_bytes() + repr(STAGES).encode())
+    for each in patches:
+        digest.update(each.tobytes())
+    return digest.hexdigest()[:32]

@@ -1,0 +1,101 @@
+"""From a rate of false answers to a threshold.
+
+What is wanted is how much evidence an object of no known category finds for the best of the wrong ones. Every decision gives one sample
+of that, without any label: of a known object the best of the other categories, had its own not been there (its rival); of a novel one the
+best of all. No similarity within a category enters, so it does not matter that a category was seen in one instance only, whose views are
+more alike than two instances are. That gap shows in the estimated probability alone, where the shipped figures are of different instances.
+
+Until the memory has samples of its own the shipped ones stand in (`python -m benchmarks.decision_prior` makes them).
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import t as student
+
+FloatArray = NDArray[np.floating]
+
+SHIPPED = Path(__file__).parent / "backbones" / "statistics" / "decision.json"
+PRIOR_SAMPLES = 10.0
+"""Own samples that weigh as much as all shipped ones."""
+LOWER = 0.1587
+"""Quantile one standard deviation below the median of a normal distribution."""
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Evidence of one kind: from tokens alone, or with poses."""
+
+    rivals: tuple[float, ...]
+    """Of the best wrong category."""
+    own: tuple[float, ...]
+    """Of the right category, by other instances of it."""
+
+
+@dataclass(frozen=True)
+class Prior:
+    """What ships."""
+
+    cohort: float
+    """Usual match of a burst with the most similar of other categories."""
+    agreement_weight: float
+    """Evidence a unit of agreement of a pose is worth: such that both vary as much among wrong categories."""
+    tokens: Samples
+    verified: Samples
+
+    def of(self, verified: bool) -> Samples:
+        """The samples of one kind of evidence."""
+        return self.verified if verified else self.tokens
+
+    @staticmethod
+    @cache
+    def shipped() -> Prior:
+        """The estimate that comes with OneLook."""
+        fields = json.loads(SHIPPED.read_text())
+        kinds = {kind: Samples(tuple(fields[kind]["rivals"]), tuple(fields[kind]["own"])) for kind in ("tokens", "verified")}
+        return Prior(fields["cohort"], fields["agreement_weight"], kinds["tokens"], kinds["verified"])
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """The evidence for the best wrong category as a Student distribution, and for the right one as a normal one of the same spread."""
+
+    location: float
+    spread: float
+    freedom: float
+    own_location: float
+
+    @staticmethod
+    def fit(rivals: Sequence[float], prior: Samples) -> Calibration:
+        """From the memory's own rivals and the shipped samples.
+
+        Location is the median, spread the distance of the lower quantile: an object that was called novel though its category is known
+        counts among the rivals with too much evidence, and must not move the threshold.
+        """
+        values = np.concatenate([np.asarray(prior.rivals), np.asarray(rivals, dtype=float)])
+        weights = np.concatenate([np.full(len(prior.rivals), PRIOR_SAMPLES / len(prior.rivals)), np.ones(len(rivals))])
+        low, middle = _quantiles(values, weights, (LOWER, 0.5))
+        return Calibration(middle, max(middle - low, 1e-6), float(weights.sum()) - 1, float(np.median(prior.own)))
+
+    def threshold(self, rate: float) -> float:
+        """What an object of no known category exceeds with this probability."""
+        return self.location + self.spread * float(student.ppf(1 - rate, self.freedom)) * float(np.sqrt(1 + 1 / (self.freedom + 1)))
+
+    def probability(self, evidence: float) -> float:
+        """That the most similar category is right, with even odds beforehand; grows with the evidence."""
+        apart = max(self.own_location - self.location, self.spread)
+        middle = self.location + apart / 2
+        return float(1 / (1 + np.exp(np.clip(-(evidence - middle) * apart / self.spread**2, -50, 50))))
+
+
+def _quantiles(values: FloatArray, weights: FloatArray, levels: Sequence[float]) -> FloatArray:
+    order = np.argsort(values)
+    cumulative = np.cumsum(weights[order]) - weights[order] / 2
+    return np.asarray(np.interp(np.asarray(levels) * weights.sum(), cumulative, values[order]))

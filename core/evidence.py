@@ -1,0 +1,155 @@
+"""Our similarity of a burst to a category (`best`): whitened patches matched view by view, less what both resemble anyway.
+
+Three things beyond the paper's cosines of [CLS]:
+- patches of the block that serves correspondences, whitened, and centred on what this memory sees on average;
+- every view counts by the other side's view it matches best, since opposite sides of one object look unalike;
+- from a match is taken what burst and member reach with other categories: some objects resemble everything (hubs), and a burst of many
+  views finds a good match for each of them. What is left does not grow with the number of views.
+
+Letters: V, W views, K patches a view, D token size, C categories.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol, TypeVar
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from core.backbones.whitening import Whitening
+from core.descriptors import unit
+from core.encode import EncodedBurst
+
+FloatArray = NDArray[np.floating]
+
+PATCHES = 24
+"""Patches kept of each view, drawn at random: the figures of 12 and of 48 differ by less than a hundredth."""
+COHORT = 5
+"""Other categories that tell how well a burst matches anything: the most similar ones."""
+SHORTLIST = 5
+"""Categories, the best matching first, whose evidence is computed."""
+CENTRE_PRIOR = 4.0
+"""Bursts for which the shipped mean counts when the memory's own bursts move it."""
+BATCH = 16
+"""Bursts matched at once: about 40 MB."""
+MOST_MEMBERS = 256
+"""Of a larger memory the members most similar by pooled tokens are compared patch by patch."""
+
+
+def sample_patches(encoded: EncodedBurst) -> NDArray[np.float16]:
+    """Tokens of random foreground patches, shape (V, K, D), of the views that show an object; drawn again where there are fewer."""
+    rng = np.random.default_rng(0)
+    shown = [view.descriptors for view in encoded.views if len(view.descriptors)]
+    return np.stack([tokens[rng.permutation(len(tokens))[np.arange(PATCHES) % len(tokens)]] for tokens in shown]).astype(np.float16)
+
+
+def whitened(patches: FloatArray, whitening: Whitening | None) -> FloatArray:
+    """The same, whitened where the backbone has statistics."""
+    return patches.astype(np.float32) if whitening is None else whitening.apply(patches.astype(np.float32))
+
+
+def centre(members: Sequence[FloatArray]) -> FloatArray:
+    """What these bursts' whitened patches, each (V, K, D), have in common, shape (D,).
+
+    It is shrunk towards the shipped mean, which is zero once whitened.
+    """
+    means = np.stack([member.reshape(-1, member.shape[-1]).mean(axis=0, dtype=np.float64) for member in members])
+    return np.asarray(means.sum(axis=0) / (len(members) + CENTRE_PRIOR))
+
+
+def directions(patches: FloatArray, middle: FloatArray) -> Tensor:
+    """Unit patches about a centre, shape (V, K, D)."""
+    return torch.nn.functional.normalize(torch.from_numpy(patches - middle).float(), dim=-1)
+
+
+def match_views(target: Tensor, others: Sequence[Tensor]) -> FloatArray:
+    """How well a burst matches each of others, shape (len(others),), of unit patches (V, K, D) and (W, K, D).
+
+    Two views match by the mean over patches of the cosine to the other's most similar patch, both ways; two bursts by the mean over views
+    of the match with the other's best matching view, both ways.
+    """
+    found: list[float] = []
+    for start in range(0, len(others), BATCH):
+        batch = others[start : start + BATCH]
+        cosines = torch.einsum("vkd,wld->vwkl", target, torch.cat(list(batch)))
+        views = (cosines.amax(dim=3).mean(dim=2) + cosines.amax(dim=2).mean(dim=2)) / 2
+        for each in torch.split(views, [len(other) for other in batch], dim=1):
+            found.append(float((each.amax(dim=0).mean() + each.amax(dim=1).mean()) / 2))
+    return np.array(found)
+
+
+def cohort_level(matches: FloatArray, prior: float) -> FloatArray:
+    """Mean of the COHORT best of the matches with other categories, shape (*) from (*, C).
+
+    −inf stands for no category; what is missing to COHORT counts as `prior`.
+    """
+    short = max(COHORT - matches.shape[-1], 0)
+    padded = np.concatenate([matches, np.full((*matches.shape[:-1], short), -np.inf)], axis=-1)
+    best = -np.partition(-padded, COHORT - 1, axis=-1)[..., :COHORT]
+    return np.asarray(np.where(np.isfinite(best), best, prior).mean(axis=-1))
+
+
+class HasPooled(Protocol):
+    """Anything with one pooled token a view."""
+
+    @property
+    def pooled(self) -> FloatArray:
+        """Shape (V, D)."""
+
+
+Pooled = TypeVar("Pooled", bound=HasPooled)
+
+
+def most_similar_members(members: Sequence[Pooled], pooled: FloatArray) -> list[Pooled]:
+    """All of a small memory, in order; of a larger one the MOST_MEMBERS whose pooled tokens are nearest any of these, shape (V, D)."""
+    if len(members) <= MOST_MEMBERS:
+        return list(members)
+    asked = unit(pooled)
+    nearness = [float((unit(member.pooled) @ asked.T).max()) for member in members]
+    return [members[index] for index in sorted(np.argsort(nearness)[-MOST_MEMBERS:])]
+
+
+@dataclass(frozen=True, eq=False)
+class Entry:
+    """A member of the memory as the evidence sees it."""
+
+    category_id: str
+    patches: Tensor
+    """Unit patches about the memory's centre, shape (V, K, D)."""
+
+
+class Comparison:
+    """One burst against a memory. A category's first member, its founder, represents it to others."""
+
+    def __init__(self, entries: Sequence[Entry], target: Tensor, cohort_prior: float) -> None:
+        """`target`: unit patches about the same centre, shape (V, K, D)."""
+        self._entries, self._prior = entries, cohort_prior
+        self._matches = match_views(target, [entry.patches for entry in entries])
+        self._of: dict[str, list[int]] = {}
+        for index, entry in enumerate(entries):
+            self._of.setdefault(entry.category_id, []).append(index)
+        self._between: dict[tuple[int, int], float] = {}
+
+    def ranked(self, without: str | None = None) -> list[tuple[str, float]]:
+        """(category, evidence) of the SHORTLIST best matching categories, most evidence first; as if `without` were not in the memory."""
+        best = {category: max(indices, key=lambda index: self._matches[index]) for category, indices in self._of.items()}
+        best.pop(without or "", None)
+        shortlist = sorted(best, key=lambda category: -self._matches[best[category]])[:SHORTLIST]
+        evidence = {category: self._evidence(best[category], [other for other in best if other != category]) for category in shortlist}
+        return sorted(evidence.items(), key=lambda entry: (-entry[1], entry[0]))
+
+    def _evidence(self, member: int, others: Sequence[str]) -> float:
+        founders = [self._of[other][0] for other in others]
+        of_burst = cohort_level(self._matches[founders], self._prior)
+        of_member = cohort_level(self._to_founders(member, founders), self._prior)
+        return float(self._matches[member] - (of_burst + of_member) / 2)
+
+    def _to_founders(self, member: int, founders: Sequence[int]) -> FloatArray:
+        missing = [founder for founder in founders if (member, founder) not in self._between]
+        for founder, match in zip(missing, match_views(self._entries[member].patches, [self._entries[each].patches for each in missing])):
+            self._between[member, founder] = float(match)
+        return np.array([self._between[member, founder] for founder in founders])

@@ -1,0 +1,45 @@
+"""Verification by pose: does a category's reference explain a burst?
+
+The tokens say which categories to ask; the best pose of each then lays its reference on the burst. Two objects of a kind agree over most
+of their surface, in shape and appearance at once; two of different kinds can be laid on each other but do not agree.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import torch
+
+from core.backbones.whitening import Whitening
+from core.dense import DenseAgreement, DenseConfig
+from core.descriptors import unit
+from core.encode import EncodedBurst, EncodedView
+from core.estimators.batched import Sim3Batch
+from core.reference import Reference
+from core.sim3 import Sim3
+from core.views import FloatArray
+
+DENSE = DenseConfig(points=700, sigma=0.1)
+"""Wider than for ranking poses: objects of a kind differ in shape."""
+
+
+def agreement(reference: Reference, target: EncodedBurst, target_from_reference: Sim3, whitening: Whitening | None) -> float:
+    """How well a pose lays the reference on the burst, in [0, 1], by whole whitened tokens and measured points.
+
+    Whitened, since the reference's own components, which serve to find the pose, tell parts of its kind apart and not kinds.
+    """
+    sides = [[view.trusted_only() for view in views] for views in (reference.views, target.views)]
+    described = [_describe(views, whitening) for views in sides]
+    dense = DenseAgreement(sides[0], sides[1], (described[0], described[1]), DENSE, seed=0)
+    pose = target_from_reference
+    batch = Sim3Batch(
+        torch.tensor([pose.scale]).float(),
+        torch.from_numpy(pose.rotation)[None].float(),
+        torch.from_numpy(np.asarray(pose.translation))[None].float(),
+    )
+    return float(dense.score(batch)[0])
+
+
+def _describe(views: Sequence[EncodedView], whitening: Whitening | None) -> list[FloatArray]:
+    return [unit(view.descriptors if whitening is None else whitening.apply(view.descriptors)) for view in views]

@@ -1,0 +1,74 @@
+"""What a burst shows: the decision, with the poses that verified it and, where it is uncertain, where to look next."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from core.backbones.whitening import Whitening
+from core.encode import EncodedBurst
+from core.errors import InvalidInput, NoObject, NoPose, Unavailable
+from core.matches import PoseEstimate
+from core.next_view import Candidate, next_viewpoints
+from core.novelty import BEST, Context, Decision, DecisionConfig, decide
+from core.pose import PoseConfig, PoseEstimator
+from core.reference import Reference
+from core.verification import agreement
+from store.memory import Memory
+
+CALIBRATED_BY = 300
+"""Latest decisions that the threshold is made of; objects and places of long ago need not be today's."""
+VERIFYING = PoseConfig.named("best")
+"""The poses that verify, whatever variant the answer's pose is of: the shipped figures are of these."""
+
+
+@dataclass(frozen=True, eq=False)
+class Judgement:
+    """See module."""
+
+    decision: Decision
+    viewpoints: NDArray[np.floating] | None
+    """Of an uncertain object, shape (n, 4, 4); None without depth and cameras."""
+
+
+@dataclass(eq=False)
+class Judge:
+    """Judges one burst."""
+
+    memory: Memory
+    encoded: EncodedBurst
+    whitening: Whitening | None
+    seed: int = 0
+    poses: dict[str, tuple[Reference, PoseEstimate]] = field(default_factory=dict)
+    """By category, those that were tried."""
+
+    def judge(self, config: DecisionConfig) -> Judgement:
+        """Decides by the memory as it is. Poses are tried where the score is `best` and the burst has depth and cameras."""
+        members = self.memory.categories.members()
+        past = self.memory.observations.decisions(CALIBRATED_BY) if config.score == BEST else []
+        context = Context(self.whitening, past, self._agreement if self._has_poses else None)
+        decision = decide(members, self.encoded, config, context)
+        return Judgement(decision, self._viewpoints(decision) if decision.outcome == "uncertain" else None)
+
+    @property
+    def _has_poses(self) -> bool:
+        return bool(len(self.encoded.cloud_m)) and all(view.camera is not None for view in self.encoded.views)
+
+    def _agreement(self, category_id: str) -> float:
+        try:
+            reference = self.memory.categories.reference(category_id)
+            estimate = PoseEstimator(VERIFYING).estimate(reference, self.encoded, seed=self.seed)
+        except (NoPose, InvalidInput, Unavailable):  # nothing of the reference is found in the burst, or the reference is damaged
+            return 0.0
+        self.poses[category_id] = (reference, estimate)
+        return agreement(reference, self.encoded, estimate.target_from_reference, self.whitening)
+
+    def _viewpoints(self, decision: Decision) -> NDArray[np.floating] | None:
+        tried = [self.poses[category] for category, _ in decision.similarities if category in self.poses]
+        try:
+            laid = [Candidate(reference, estimate.target_from_reference) for reference, estimate in tried]
+            return next_viewpoints(self.encoded, laid, self.whitening)
+        except (InvalidInput, NoObject):  # no depth or no camera places the object
+            return None

@@ -1,0 +1,48 @@
+"""Thresholds of samples drawn from distributions whose quantiles are known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from core.calibration import Calibration, Prior, Samples
+
+RNG = np.random.default_rng(0)
+PRIOR = Samples(tuple(np.random.default_rng(1).normal(0.5, 0.3, 20)), (2.0, 2.5))
+
+
+@pytest.mark.parametrize("rate", [0.01, 0.05])
+def test_many_samples_of_its_own_give_the_quantile_asked_for(rate: float) -> None:
+    rivals = RNG.normal(0.1, 0.05, 2000)
+    threshold = Calibration.fit(rivals, PRIOR).threshold(rate)
+    assert rate / 2 < (RNG.normal(0.1, 0.05, 200_000) > threshold).mean() < rate * 2
+
+
+def test_few_samples_leave_the_prior_and_are_more_careful() -> None:
+    none, some = Calibration.fit([], PRIOR), Calibration.fit([0.1] * 5, PRIOR)
+    assert none.location == pytest.approx(np.median(PRIOR.rivals), abs=0.05)
+    assert 0.1 <= some.location < none.location
+    assert none.threshold(0.01) > none.location + 2.33 * none.spread  # a normal distribution that is known would end there
+
+
+def test_objects_falsely_called_novel_hardly_move_the_threshold() -> None:
+    rivals = RNG.normal(0.1, 0.05, 300)
+    clean = Calibration.fit(rivals, PRIOR)
+    mixed = Calibration.fit(np.concatenate([rivals, RNG.normal(0.6, 0.1, 60)]), PRIOR)
+    assert mixed.threshold(0.01) - clean.threshold(0.01) < clean.spread
+
+
+def test_probability_grows_with_the_evidence_and_is_even_in_the_middle() -> None:
+    calibration = Calibration.fit(RNG.normal(0.1, 0.05, 300), PRIOR)
+    levels = [calibration.probability(evidence) for evidence in np.linspace(-1, 3, 50)]
+    assert levels == sorted(levels)
+    assert levels[0] < 0.01
+    assert levels[-1] > 0.99
+    assert calibration.probability((calibration.location + calibration.own_location) / 2) == pytest.approx(0.5)
+
+
+def test_what_ships_puts_other_instances_above_other_categories() -> None:
+    prior = Prior.shipped()
+    for samples in (prior.tokens, prior.verified):
+        assert np.median(samples.own) > np.quantile(samples.rivals, 0.75)
+    assert prior.agreement_weight > 0

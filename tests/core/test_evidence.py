@@ -1,0 +1,70 @@
+"""Matches and cohorts computed by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+
+from core.evidence import CENTRE_PRIOR, COHORT, Comparison, Entry, centre, cohort_level, directions, match_views, sample_patches
+from core.sim3 import Sim3
+
+from .conftest import PaintedObject
+
+AXES = torch.eye(6)
+
+
+def views(*patches: list[int]) -> torch.Tensor:
+    """One view for each list, whose patches are the axes named."""
+    return torch.stack([AXES[each] for each in patches])
+
+
+def test_a_view_matches_by_its_patches_and_a_burst_by_its_best_views() -> None:
+    assert match_views(views([0, 1]), [views([0, 1])])[0] == 1
+    assert match_views(views([0, 1]), [views([0, 2])])[0] == 0.5
+    # The second view finds nothing; the first finds its like, and the other side's only view finds it too.
+    assert match_views(views([0, 1], [4, 5]), [views([0, 1])])[0] == pytest.approx((1 + (1 + 0) / 2) / 2)
+
+
+def test_many_bursts_are_matched_as_one_after_the_other() -> None:
+    generator = torch.Generator().manual_seed(0)
+    others = [torch.nn.functional.normalize(torch.randn(1 + index % 3, 5, 6, generator=generator), dim=-1) for index in range(40)]
+    together = match_views(others[0], others)
+    np.testing.assert_allclose(together, [match_views(others[0], [other])[0] for other in others], atol=1e-6)
+    np.testing.assert_allclose(together, [match_views(other, [others[0]])[0] for other in others], atol=1e-6)
+
+
+def test_the_cohort_is_the_best_of_the_others_and_filled_by_the_prior() -> None:
+    assert cohort_level(np.arange(10.0), 0.0) == pytest.approx(np.mean(np.arange(10 - COHORT, 10)))
+    assert cohort_level(np.array([1.0]), 0.5) == pytest.approx((1 + 0.5 * (COHORT - 1)) / COHORT)
+    assert cohort_level(np.array([1.0, -np.inf]), 0.5) == cohort_level(np.array([1.0]), 0.5)
+    assert cohort_level(np.zeros((3, 0)), 0.5).tolist() == [0.5] * 3
+
+
+def test_the_centre_is_shrunk_towards_zero() -> None:
+    bursts = [np.ones((2, 3, 4)), 3 * np.ones((5, 3, 4))]
+    np.testing.assert_allclose(centre(bursts), 4 / (2 + CENTRE_PRIOR))
+
+
+def test_what_resembles_everything_is_no_evidence() -> None:
+    """A hub matches the burst best of all, but matches every other category as well."""
+    everything = views([0, 1, 2, 3, 4, 5])
+    entries = [Entry("hub", everything), *(Entry(f"{axis}", views([axis] * 6)) for axis in range(6))]
+    ranked = Comparison(entries, views([0, 0, 0, 0, 0, 1]), cohort_prior=0.0).ranked()
+    assert ranked[0][0] == "0"
+    assert dict(ranked)["0"] > dict(ranked)["hub"]
+
+
+def test_a_category_left_out_is_as_if_it_were_not_there() -> None:
+    entries = [Entry(f"{axis}", views([axis, (axis + 1) % 6])) for axis in range(4)]
+    asked = views([0, 1])
+    assert Comparison(entries, asked, 0.2).ranked(without="0") == Comparison(entries[1:], asked, 0.2).ranked()
+
+
+def test_patches_are_drawn_the_same_way_every_time_from_views_that_show_something(painted: PaintedObject) -> None:
+    burst = painted.encode(3, Sim3.identity())
+    first, again = sample_patches(burst), sample_patches(burst)
+    assert first.shape == (3, 24, 48)
+    np.testing.assert_array_equal(first, again)
+    length = torch.linalg.vector_norm(directions(first.astype(np.float32), np.zeros(48)), dim=-1)
+    torch.testing.assert_close(length, torch.ones(3, 24))
