@@ -233,18 +233,18 @@ class Observation(Generic[S]):
     """Categories, most similar first."""
     threshold: float | None
     """Least similarity of a known object; None where the request named the category."""
-    margin: float | None
-    """By how much the most similar category leads the next."""
-    probability: float | None
-    """Estimated, that the most similar category is right."""
-    candidates: tuple[str, ...]
-    """Categories that an uncertain object may be of."""
-    viewpoints: FloatArray | None
-    """Of an uncertain object: world_from_camera of where to look next, most telling first, shape (n, 4, 4)."""
     timings_ms: Mapping[str, float]
     """Milliseconds of each stage in the service, and their `total`."""
     raw: Mapping[str, Any]
     """The answer's JSON."""
+    margin: float | None = None
+    """By how much the most similar category leads the next."""
+    probability: float | None = None
+    """Estimated, that the most similar category is right."""
+    candidates: tuple[str, ...] = ()
+    """Categories that an uncertain object may be of."""
+    viewpoints: FloatArray | None = None
+    """Of an uncertain object: world_from_camera of where to look next, most telling first, shape (n, 4, 4)."""
 
     def with_scan(self, make: Callable[[S], R]) -> Observation[R]:
         """The same, with what `make` makes of its scan, if it has one."""

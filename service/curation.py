@@ -86,7 +86,10 @@ class Curation:
         self._events.publish("instance_forgotten", id=instance_id, category_id=category_id)
 
     def similarities(self, category_id: str) -> Similarities:
-        """By the score that decides, where it compares two bursts and nothing else, or by OVERVIEW. Raises NotFound, and Unavailable where tokens of the category are damaged."""
+        """By the score that decides, where it compares two bursts and nothing else, or by OVERVIEW.
+
+        Raises NotFound, and Unavailable where tokens of the category are damaged.
+        """
         self._memory.categories.get(category_id)
         score = SCORES[self._score]
         bursts: dict[str, list[FloatArray]] = {}

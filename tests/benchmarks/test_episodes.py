@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from benchmarks.discovery import score_rows
-from benchmarks.episodes import draw_orders, episode
+from benchmarks.episodes import MOST_SEQUENCES, Counts, SetSource, draw_orders
+from benchmarks.episodes import episode as run_episode
 from benchmarks.pair_scores import PairScores
 
 LABELS = np.array([0, 0, 1, 1])
@@ -27,12 +28,16 @@ def pairs_of(similarity: np.ndarray) -> PairScores:
     return PairScores("paper_mean", np.ones(len(similarity), dtype=int), similarity, np.zeros((*similarity.shape, 0)))
 
 
+def episode(pairs: PairScores, labels: np.ndarray, order: list[int], thresholds: np.ndarray) -> Counts:
+    return run_episode(SetSource(pairs, len(order)), labels, order, thresholds)
+
+
 def test_a_threshold_between_the_kinds_makes_no_error() -> None:
     counts = episode(pairs_of(TWO_KINDS), LABELS, [0, 1, 2, 3], CURVE)
-    assert (counts.presented, counts.seen) == (4, 2)
+    assert (counts.presented.tolist(), counts.seen.tolist()) == ([4], [2])
     # At 0.2, burst 2 joins the first kind at the mean 0.25, and 3 joins all three at (0.1 + 0.1 + 0.6) / 3.
-    assert counts.false_positive.tolist() == [2, 2, 0, 0, 0, 0]
-    assert counts.false_negative.tolist() == [0, 0, 0, 0, 1, 2]
+    assert counts.false_positive.tolist() == [[2, 2, 0, 0, 0, 0]]
+    assert counts.false_negative.tolist() == [[0, 0, 0, 0, 1, 2]]
     assert counts.fp.tolist() == [50, 50, 0, 0, 0, 0]
     assert counts.fn.tolist() == [0, 0, 0, 0, 50, 100]
 
@@ -40,46 +45,67 @@ def test_a_threshold_between_the_kinds_makes_no_error() -> None:
 def test_a_category_is_compared_by_the_mean_over_its_members() -> None:
     # Burst 2 has 0.3 to burst 0 and 0.2 to burst 1.
     counts = episode(pairs_of(TWO_KINDS), LABELS, [0, 1, 2], np.array([0.24, 0.26]))
-    assert counts.false_positive.tolist() == [1, 0]
+    assert counts.false_positive.tolist() == [[1, 0]]
 
 
 def test_joining_the_majority_is_right_even_in_a_mixed_category() -> None:
     everything_alike = np.full((4, 4), 0.5)
     counts = episode(pairs_of(everything_alike), np.array([0, 1, 1, 1]), [0, 1, 2, 3], np.array([0.4]))
     # 1 joins 0's category: wrong. 2 finds one member of each kind, a tie, and 3 a majority of its own: right.
-    assert counts.false_positive.tolist() == [1]
-    assert counts.false_negative.tolist() == [0]
+    assert counts.false_positive.tolist() == [[1]]
+    assert counts.false_negative.tolist() == [[0]]
 
 
 def test_a_category_founded_twice_is_known_by_either() -> None:
     # Burst 1 is falsely novel; burst 0 again goes to its own founder, which is a repeat and not counted.
     counts = episode(pairs_of(TWO_KINDS), LABELS, [0, 1, 0, 1], np.array([0.9]))
-    assert (counts.presented, counts.seen, counts.false_negative.tolist(), counts.false_positive.tolist()) == (2, 1, [1], [0])
+    assert (counts.presented.sum(), counts.seen.sum(), counts.false_negative.sum(), counts.false_positive.sum()) == (2, 1, 1, 0)
 
 
 def test_counts_add_up() -> None:
     once = episode(pairs_of(TWO_KINDS), LABELS, [0, 1, 2, 3], CURVE)
     twice = once + once
-    assert (twice.presented, twice.seen) == (8, 4)
+    assert (twice.presented.tolist(), twice.seen.tolist()) == ([4, 4], [2, 2])
     np.testing.assert_array_equal(twice.fn, once.fn)
 
 
-def test_orders_are_seeded_and_within_the_bursts() -> None:
-    orders = draw_orders(3, bursts=5, length=20, seed=1)
-    assert orders == draw_orders(3, bursts=5, length=20, seed=1) != draw_orders(3, bursts=5, length=20, seed=2)
-    assert {burst for order in orders for burst in order} == set(range(5))
+def test_repeats_are_counted_apart() -> None:
+    counts = episode(pairs_of(TWO_KINDS), LABELS, [0, 0, 1, 0], np.array([0.5, 2.0]))
+    assert (counts.presented.tolist(), counts.repeats.tolist()) == ([2], [2])
+    assert counts.repeat_errors.tolist() == [[0, 2]]  # nothing exceeds 2, not even a burst's similarity to itself
+
+
+def test_the_memory_s_growth_stands_beside_the_truth() -> None:
+    counts = episode(pairs_of(TWO_KINDS), LABELS, [0, 1, 2, 3], np.array([0.5, 0.9]))
+    assert counts.categories.tolist() == [[1, 1, 2, 2], [1, 2, 3, 4]]
+    assert counts.truth.tolist() == [1, 1, 2, 2]
+
+
+def test_bands_are_quantiles_over_episodes() -> None:
+    best, worst = (episode(pairs_of(TWO_KINDS), LABELS, [0, 1, 2, 3], np.array([threshold])) for threshold in (0.5, 0.9))
+    _, fn = (best + worst).bands(0.0, 1.0)
+    assert fn[:, 0].tolist() == [0, 100]
+
+
+def test_orders_are_seeded_and_of_ten_sequences_a_category() -> None:
+    labels = np.repeat([0, 1], [5, 30])
+    orders = draw_orders(3, labels, length=400, seed=1)
+    assert orders == draw_orders(3, labels, length=400, seed=1) != draw_orders(3, labels, length=400, seed=2)
+    for order in orders:
+        assert {burst for burst in order if burst < 5} == set(range(5))
+        assert len({burst for burst in order if burst >= 5}) == MOST_SEQUENCES
 
 
 @pytest.fixture
 def two_kinds_of_rows() -> list[dict[str, object]]:
     """The table of three episodes over TWO_KINDS."""
-    return [dict(row) for row in score_rows(pairs_of(TWO_KINDS), LABELS, draw_orders(3, 4, 12, seed=0))]
+    return [dict(row) for row in score_rows("paper_mean", pairs_of(TWO_KINDS), LABELS, draw_orders(3, LABELS, 12, seed=0))]
 
 
 def test_separable_kinds_have_a_perfect_summary(two_kinds_of_rows: list[dict[str, object]]) -> None:
     *curve, summary = two_kinds_of_rows
     assert (summary["auroc"], summary["nearest"], summary["fn_at_zero_fp"], summary["fn_at_one_fp"]) == (1, 1, 0, 0)
-    assert all(set(row) == {"score", "threshold", "fp", "fn"} for row in curve)
+    assert all(set(row) == {"score", "threshold", "fp", "fn", "fp_band", "fn_band", "repeat_error"} for row in curve)
     thresholds = [row["threshold"] for row in curve]
     assert thresholds == sorted(thresholds)
     assert (curve[-1]["fp"], curve[-1]["fn"]) == (0, 100)
@@ -87,5 +113,5 @@ def test_separable_kinds_have_a_perfect_summary(two_kinds_of_rows: list[dict[str
 
 def test_inseparable_kinds_have_none() -> None:
     alike = np.full((4, 4), 0.5) + 0.5 * np.eye(4)
-    summary = score_rows(pairs_of(alike), LABELS, draw_orders(3, 4, 12, seed=0))[-1]
+    summary = score_rows("paper_mean", pairs_of(alike), LABELS, draw_orders(3, LABELS, 12, seed=0))[-1]
     assert (summary["auroc"], summary["fn_at_zero_fp"]) == (0.5, 100)
