@@ -16,6 +16,7 @@ def observe(
     learn: bool = True,
     category_id: str | None = None,
     threshold: float | None = None,
+    false_known_rate: float | None = None,
     views_used: int | None = None,
     up: Direction | None = None,
     variant: str | None = None,
@@ -36,7 +37,8 @@ def observe(
         frame: name of the burst's world frame, given back as it came.
         learn: whether a known object's burst joins its category.
         category_id: takes the object for one of this category, and skips the decision.
-        threshold: least similarity of a known object.
+        threshold: least similarity of a known object, in place of one from a rate.
+        false_known_rate: of objects of no known category, the share that may be called known.
         views_used: only the first so many views.
         up: away from the support, in the world frame, for the scan of a novel object; told from the cameras where None.
         variant, dof, dims, method, consensus_deg, inlier_ratio, estimator, alternatives, seed: of the pose pipeline (docs/method.md).
@@ -47,6 +49,7 @@ def observe(
         learn=learn,
         category_id=category_id,
         threshold=threshold,
+        false_known_rate=false_known_rate,
         views_used=views_used,
         up=None if up is None else list(up),
         variant=variant,
