@@ -126,6 +126,7 @@ class AsyncRobotClient:
     observe = _method(observing.observe, _observation)
     observation = _method(observing.observation, _observation)
     observations = _method(observing.observations, _observations)
+    detections = _method(observing.detections, _as_is)
     picture = _method(observing.picture, _as_is)
     scan = _method(scanning.scan, _scan)
     open_scan = _method(scanning.open_scan, _scan)

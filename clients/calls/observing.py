@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
 from clients.answers import Observation, Outcome, ScanRequest
 from clients.calls.call import Call, Direction, burst_body, given, reading, reading_list
@@ -78,6 +78,11 @@ def observations(
     """The latest observations, newest first: older than the observation `before`, and only those decided so."""
     params = given(limit=limit, before=before, category_id=category_id, outcome=outcome)
     return Call("GET", "/v1/observations", reading_list("observations", Observation.from_json), params)
+
+
+def detections(observation_id: str) -> Call[dict[str, Any]]:
+    """An earlier observation in the shape of ROS 2's vision_msgs/msg/Detection3DArray, as JSON."""
+    return Call("GET", f"/v1/observations/{observation_id}", reading(dict), {"format": "vision_msgs"})
 
 
 def picture(path: str, **params: str | int) -> Call[bytes]:

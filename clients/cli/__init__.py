@@ -8,9 +8,10 @@ from __future__ import annotations
 from typing import Any
 
 import typer
+from rich.markup import escape
 from typer.core import TyperGroup
 
-from clients.cli import bench, categories, data, demo, memory, render, robot, service
+from clients.cli import bench, categories, data, demo, doctor, memory, render, robot, service
 from clients.cli.terminal import errors
 from core.errors import OneLookError
 
@@ -26,7 +27,7 @@ class OneLookGroup(TyperGroup):
         try:
             return super().invoke(ctx)
         except OneLookError as error:
-            errors.print(f"[bold red]error:[/] {error}", highlight=False, soft_wrap=True)
+            errors.print(f"[bold red]error:[/] {escape(str(error))}", highlight=False, soft_wrap=True)
             raise typer.Exit(1) from None
         except ModuleNotFoundError as error:
             library = (error.name or "").split(".")[0]
@@ -48,6 +49,7 @@ app = typer.Typer(
     pretty_exceptions_show_locals=False,
 )
 app.command("serve", cls=service.ServeCommand)(service.serve)
+app.command("doctor")(doctor.doctor)
 app.command("observe")(robot.observe)
 app.command("scan")(robot.scan)
 app.add_typer(categories.app, name="categories")

@@ -37,20 +37,26 @@ def list_categories(url: Url = URL, json: Json = False) -> None:
 
 
 @app.command()
-def rename(category: Which, name: Annotated[str, typer.Argument(help="What people call it.")], url: Url = URL) -> None:
+def rename(category: Which, name: Annotated[str, typer.Argument(help="What people call it.")], url: Url = URL, json: Json = False) -> None:
     """Give a category a name."""
     with RobotClient(url) as robot:
         renamed = robot.rename(find(robot.categories(), category).id, name)
-    console.print(f"{renamed.id} is called {renamed.name}")
+    if json:
+        print_json(asdict(renamed))
+    else:
+        console.print(f"{renamed.id} is called {renamed.name}")
 
 
 @app.command()
-def forget(category: Which, url: Url = URL) -> None:
+def forget(category: Which, url: Url = URL, json: Json = False) -> None:
     """Delete a category and all that was learnt with it."""
     with RobotClient(url) as robot:
         forgotten = find(robot.categories(), category)
         robot.forget(forgotten.id)
-    console.print(f"forgot {forgotten.name or forgotten.id}")
+    if json:
+        print_json(asdict(forgotten))
+    else:
+        console.print(f"forgot {forgotten.name or forgotten.id}")
 
 
 class Named(Protocol):

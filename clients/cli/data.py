@@ -17,12 +17,16 @@ def samples(
     instances: Annotated[int, typer.Option(min=1, help="Objects of each category.")] = 3,
     views: Annotated[int, typer.Option(min=2, help="Views of each object.")] = 12,
     seed: Annotated[int, typer.Option(help="Of the draw.")] = 0,
+    json: Json = False,
 ) -> None:
     """Make small copies of recorded objects, in the same layout, drawn by a seed."""
     from clients.datasets.shrink import ShrinkConfig, shrink
 
     names = shrink(data, out, ShrinkConfig(categories=categories, instances=instances, views=views), seed=seed)
-    console.print(f"{len(names)} objects in {out}: {', '.join(names)}")
+    if json:
+        print_json([str(out / name) for name in names])
+    else:
+        console.print(f"{len(names)} objects in {out}: {', '.join(names)}")
 
 
 def convert(

@@ -3,61 +3,85 @@
 from __future__ import annotations
 
 from dataclasses import asdict
+from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from clients.bop_results import HEADER, bop_lines, number_of
 from clients.cli.categories import find
-from clients.cli.terminal import URL, Folder, Json, Url, console, print_facts, print_json
+from clients.cli.local import connected
+from clients.cli.terminal import URL, Folder, Json, Url, console, print_facts, print_json, progress_bar
 from clients.errors import ClientError
 from clients.robot import Observation, RobotClient
 
 if TYPE_CHECKING:
-    from clients.simulator.replay import ReplayWorld
+    from clients.datasets.folders import Sequence
+    from core.views import Burst
 
 GLANCE_VIEWS = 3
 """Views that a scan starts from: they say where the object is."""
 
 Views = Annotated[int | None, typer.Option(min=1, help="Use this many views, spread around the object; all where left out.")]
+Local = Annotated[bool, typer.Option("--local", help="Ask no running service: open the memory here (ONELOOK_DATA_DIR).")]
+
+
+class Format(str, Enum):
+    """Other shapes of an answer."""
+
+    bop = "bop"
+    vision_msgs = "vision_msgs"
 
 
 def observe(
     folder: Folder,
     url: Url = URL,
+    local: Local = False,
     views: Views = None,
     category: Annotated[str | None, typer.Option(help="Take the object for one of this category (name or id).")] = None,
     threshold: Annotated[float | None, typer.Option(help="Least similarity of a known object.")] = None,
     learn: Annotated[bool, typer.Option(help="Whether a known object's views join its category.")] = True,
+    form: Annotated[
+        Format | None, typer.Option("--format", help="bop: lines of the BOP benchmark's results; vision_msgs: JSON of the ROS message.")
+    ] = None,
     json: Json = False,
 ) -> None:
     """Ask what a recorded object is, and where and how turned."""
-    burst = _world(folder).glance(views)
-    with RobotClient(url) as robot:
+    sequence, recorded = _recording(folder)
+    chosen = _spread(recorded, views)
+    burst = recorded.select(chosen)
+    with connected(url, local) as robot:
         options: dict[str, Any] = {"learn": learn}
         if category is not None:
             options["category_id"] = find(robot.categories(), category).id
         if threshold is not None:
             options["threshold"] = threshold
         seen = robot.observe(burst, **options)
-    if json:
-        print_json(seen.raw)
-    else:
-        print_facts(_facts(seen))
+        if form is Format.vision_msgs:
+            print_json(robot.detections(seen.id))
+        elif form is Format.bop:
+            _print_bop(seen, robot, burst, [sequence.images[index] for index in chosen], sequence.path)
+        elif json:
+            print_json(seen.raw)
+        else:
+            print_facts(_facts(seen))
 
 
 def scan(
     folder: Folder,
     url: Url = URL,
+    local: Local = False,
     name: Annotated[str | None, typer.Option(help="What people call the category.")] = None,
     views: Views = None,
     json: Json = False,
 ) -> None:
     """Teach the memory a category from one recorded object."""
-    world = _world(folder)
-    with RobotClient(url) as robot:
-        request = robot.scan(world.glance(GLANCE_VIEWS))
-        for view in world.glance(views).views:
+    _, recorded = _recording(folder)
+    with connected(url, local) as robot:
+        request = robot.scan(recorded.select(_spread(recorded, GLANCE_VIEWS)))
+        burst = recorded.select(_spread(recorded, views))
+        for view in progress_bar(burst.views, "sending views", len(burst)):
             request.add(view)
         category = request.complete(name)
     if json:
@@ -66,14 +90,36 @@ def scan(
         console.print(f"learnt {category.name or 'a category without a name'} ({category.id}) from {category.views} views")
 
 
-def _world(folder: Path) -> ReplayWorld:
+def _recording(folder: str) -> tuple[Sequence, Burst]:
+    """The one object that `folder` holds, and all its views."""
+    from clients.datasets.folders import load_burst
     from clients.datasets.sources import find_sequences
-    from clients.simulator.replay import ReplayWorld
 
     sequences = find_sequences(folder)
     if len(sequences) > 1:
         raise ClientError(f"{folder} holds {len(sequences)} objects; name one, such as {sequences[0].path}")
-    return ReplayWorld(sequences[0])
+    return sequences[0], load_burst(sequences[0])
+
+
+def _spread(burst: Burst, count: int | None) -> list[int]:
+    """Places of `count` views, seen from directions far apart where cameras tell; all where None."""
+    from clients.datasets.viewpoints import spread
+
+    if count is None or any(view.camera is None for view in burst.views):
+        return list(range(len(burst)))[:count]
+    return spread(burst.cameras, count)
+
+
+def _print_bop(seen: Observation, robot: RobotClient, burst: Burst, images: list[Path], folder: Path) -> None:
+    """The header alone where the object has no pose."""
+    typer.echo(HEADER)
+    if seen.pose is None:
+        return
+    ids = [each.id for each in robot.categories()]
+    number = number_of(seen.name, ids.index(seen.category_id) + 1 if seen.category_id in ids else 0)
+    seconds = seen.timings_ms["total"] / 1000
+    for line in bop_lines(seen.pose, burst.cameras, images, number_of(folder.name, 0), number, seconds):
+        typer.echo(line)
 
 
 def _facts(seen: Observation) -> dict[str, object]:

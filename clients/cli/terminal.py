@@ -6,7 +6,6 @@ import json
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Annotated, TypeVar
 
 import typer
@@ -24,7 +23,7 @@ errors = Console(stderr=True)
 
 Url = Annotated[str, typer.Option(help="Address of the service.", envvar="ONELOOK_URL")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for programs.")]
-Folder = Annotated[Path, typer.Argument(help="A recorded object: rgb/, depth/, scene_camera.json, sequence.json.")]
+Folder = Annotated[str, typer.Argument(help="A recorded object: a folder in the data layout, or bop:, co3d:, transforms:, images:FOLDER.")]
 URL = DEFAULT_URL
 
 

@@ -5,16 +5,24 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
+from typer.main import get_command
 from typer.testing import CliRunner, Result
 
+import service.app
 from clients.cli import app
 from clients.datasets import samples as shipped
 from clients.datasets.folders import Sequence
 from clients.errors import Unreachable
 from clients.simulator.local_service import local_service
+from core.errors import InvalidInput
+from store.memory import Memory
+
+from .conftest import CentreBackbone
 
 
 def onelook(*words: object) -> Result:
@@ -48,6 +56,53 @@ def test_an_object_is_taught_named_recognised_and_forgotten(url: str, samples: l
     assert json.loads(onelook("memory", "--json", "--url", url).output)["categories"] == 1
     assert onelook("categories", "forget", listed[0]["id"][:8], "--url", url).exit_code == 0
     assert "empty" in onelook("categories", "list", "--url", url).output
+
+
+def test_answers_in_other_formats(url: str, samples: list[Sequence]) -> None:
+    folder = samples[0].path
+    assert onelook("observe", folder, "--views", 2, "--format", "bop", "--url", url).output == "scene_id,im_id,obj_id,score,R,t,time\n"
+    onelook("scan", folder, "--views", 3, "--url", url)
+    header, *lines = onelook("observe", folder, "--views", 3, "--format", "bop", "--url", url).output.splitlines()
+    assert header.startswith("scene_id,im_id,obj_id")
+    assert len(lines) == 3
+    assert {tuple(line.split(",")[i] for i in (0, 2)) for line in lines} == {("0", "1")}
+    message = json.loads(onelook("observe", folder, "--views", 3, "--format", "vision_msgs", "--url", url).output)
+    assert len(message["detections"]) == 1
+
+
+def test_photographs_ask_what_an_object_is(url: str, samples: list[Sequence]) -> None:
+    seen = json.loads(onelook("observe", f"images:{samples[0].path / 'rgb'}", "--views", 3, "--json", "--url", url).output)
+    assert (seen["outcome"], seen["views"], seen["scan"]) == ("novel", 3, None)
+
+
+def test_without_a_service_the_memory_is_opened_here(samples: list[Sequence], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(service.app, "load_backbone", lambda name, device, report: CentreBackbone())
+    monkeypatch.setenv("ONELOOK_DATA_DIR", str(tmp_path / "memory"))
+    monkeypatch.setenv("ONELOOK_THRESHOLD", "0.9999")
+    taught = onelook("scan", samples[0].path, "--local", "--views", 2, "--name", "bug")
+    assert taught.exit_code == 0, taught.output
+    assert json.loads(onelook("observe", samples[0].path, "--local", "--views", 2, "--json").stdout)["name"] == "bug"
+    with Memory.open(tmp_path / "memory"):
+        taken = onelook("observe", samples[0].path, "--local")
+    assert taken.exit_code == 1
+    assert "open in another process" in taken.output
+
+
+WITHOUT_JSON = {"onelook serve", "onelook simulate", "onelook render"}
+"""The first serves and answers nothing; the others write files, simulate's JSON among them."""
+
+
+def test_every_command_has_json() -> None:
+    def leaves(command: Any, name: str) -> Iterator[tuple[str, set[str]]]:
+        inner = getattr(command, "commands", None)
+        if inner is None:
+            yield name, {option for parameter in command.params for option in parameter.opts}
+            return
+        for child, below in inner.items():
+            yield from leaves(below, f"{name} {child}")
+
+    lacking = {name for name, options in leaves(get_command(app), "onelook") if "--json" not in options}
+    assert lacking <= WITHOUT_JSON
 
 
 def test_the_demo_writes_its_report(url: str, samples: list[Sequence], tmp_path: Path) -> None:
@@ -98,3 +153,11 @@ def test_a_service_that_cannot_start_shows_its_log(monkeypatch: pytest.MonkeyPat
     monkeypatch.setenv("ONELOOK_MAX_VIEWS", "many")
     with pytest.raises(Unreachable, match="(?s)stopped; its log .*ONELOOK_MAX_VIEWS"), local_service(tmp_path / "memory", tmp_path / "log"):
         pass
+
+
+def test_brackets_of_an_error_are_printed(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(text: str) -> None:
+        raise InvalidInput("views[3].depth", "install 'onelook[server]'")
+
+    monkeypatch.setattr("clients.datasets.sources.find_sequences", refuse)
+    assert onelook("observe", "x").output == "error: views[3].depth: install 'onelook[server]'\n"
