@@ -57,8 +57,9 @@ class Memory:
 
     @classmethod
     def open(cls, folder: Path, retention: Retention | None = None) -> Memory:
-        """Opens the memory in `folder`, or makes an empty one; removes what a stopped process left half written, and what is too old.
+        """Opens the memory in `folder`, or makes an empty one; removes what a stopped process left half written.
 
+        What is too old or too much for `retention` is removed too; without one nothing is, since only whoever keeps the memory knows.
         Raises Conflict where another process has it open, or a later version made it; Unavailable where it cannot be written.
         """
         lock = _lock(folder)
@@ -71,7 +72,8 @@ class Memory:
             seal(connection)
             memory = cls(connection, lock)
             memory.requests.recover()
-            memory.prune()
+            if retention is not None:
+                memory.prune()
             sweep(connection)
         except BaseException:
             connection.close()

@@ -25,8 +25,8 @@ ROOT = Path(__file__).parents[2]
 KILLS = 20
 STEPS = ("learn", "join", "split", "learn", "join", "forget", "rename", "merge", "delete", "undo", "bring")
 """Each finds in the memory what it needs from those before."""
-LONGEST_S = 0.3
-"""A step takes some hundredths of a second, opening the memory as long."""
+LONGEST_S = 0.05
+"""A step takes some hundredths of a second; where the machine is busy, a kill falls into it all the more surely."""
 
 
 class Workers:
@@ -92,7 +92,8 @@ def test_twenty_kills_leave_no_half_category(workers: Workers, source: Path, tmp
     for round_ in range(KILLS):
         journal.unlink(missing_ok=True)
         pid = int(workers.ask("work", memory, source, journal, round_))
-        while round_ % 4 and not journal.exists():  # each fourth is killed from the start, the others once the memory is open
+        steps = moments.randrange(4) if round_ % 4 else 0  # each fourth is killed while it opens, the others in or after a step
+        while len(begun_or_done := entries(journal)) < 2 * steps and "failed" not in dict(begun_or_done):
             time.sleep(0.001)
         time.sleep(moments.uniform(0, LONGEST_S))
         os.kill(pid, signal.SIGKILL)
@@ -110,7 +111,6 @@ def test_twenty_kills_leave_no_half_category(workers: Workers, source: Path, tmp
         assert found["version"] >= version
         before, version = known, found["version"]
     assert outcomes[(True, False)] + outcomes[(True, True)] >= KILLS // 4, "hardly any kill fell into a step"
-    assert version > KILLS
 
 
 def test_a_kill_at_each_commit_and_folder_of_each_step_leaves_before_or_after(workers: Workers, source: Path, tmp_path: Path) -> None:

@@ -121,6 +121,16 @@ def test_limits_hold_after_they_were_lowered(folder: Path, burst: Burst) -> None
         assert [path.name for path in memory.observations.root.iterdir()] == ids[2:]
 
 
+def test_whoever_does_not_know_the_limits_removes_nothing(folder: Path, burst: Burst) -> None:
+    with Memory.open(folder, Retention(observations=2000)) as memory, memory._connection.change() as db:
+        old = {"created_at": "2000-01-01", "outcome": "novel", "views": 1, "timings_ms": "{}", "features_sha256": "", "files": "{}"}
+        db.table("observations").insert_all({"id": str(index)} | old for index in range(1500))
+    with Memory.open(folder) as memory:
+        assert memory.sizes().observations == 1500
+    with Memory.open(folder, Retention()) as memory:
+        assert memory.sizes().observations == 1000
+
+
 def test_no_observation_at_all_is_refused() -> None:
     with pytest.raises(InvalidInput, match="at least 1"):
         Retention(observations=0)
