@@ -25,6 +25,7 @@ from service.features import best_pair, features_as_arrays
 from service.goals import Rearranging
 from service.judgement import VERIFYING, Judge, Judgement
 from service.scanning import Scanning
+from service.upkeep import Upkeep
 from store.memory import Memory
 from store.observations import Answer, Joins
 from store.records import Alternative, Observation, Pose
@@ -87,6 +88,7 @@ class Agent:
         self.encoder = Encoder(backbone)
         self.scanning = Scanning(self.encoder, memory, self.events, config.scan_views)
         self.curation = Curation(self.encoder, memory, self.events, config.score)
+        self.upkeep = Upkeep(memory, self.events)
         self.rearranging = Rearranging(self.observe_known, memory, self.events)
 
     def observe(self, burst: Burst, options: ObserveOptions | None = None, *, frame: str | None = None) -> Observation:

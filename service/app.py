@@ -14,8 +14,10 @@ from core.backbones.dino import load_backbone
 from service import errors, openapi
 from service.agent import Agent, AgentConfig
 from service.batching import BatchingBackbone
+from service.events import Events
 from service.limits import UploadLimit
-from service.routes import categories, goals, health, observations, scans
+from service.metrics import Measured, Metrics
+from service.routes import categories, goals, health, memory, observations, scans, track
 from service.settings import Settings
 from service.work import WorkQueue
 from store.memory import Memory
@@ -31,11 +33,14 @@ log = logging.getLogger("onelook")
 def create_app(settings: Settings, *, backbone: Backbone | None = None) -> FastAPI:
     """The service with these settings; it opens its memory and loads its backbone (unless one is given) when it starts."""
 
+    metrics = Metrics()
+
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
-        with open_agent(settings, backbone) as agent:
+        with open_agent(settings, backbone, metrics) as agent:
             app.state.agent = agent
-            app.state.work = WorkQueue(settings.workers, settings.queue)
+            app.state.work = work = WorkQueue(settings.workers, settings.queue)
+            metrics.watch_work(lambda: work.pending)
             yield
 
     app = FastAPI(
@@ -46,23 +51,35 @@ def create_app(settings: Settings, *, backbone: Backbone | None = None) -> FastA
         generate_unique_id_function=lambda route: route.name,
     )
     app.state.settings = settings
+    app.state.metrics = metrics
+    app.state.tracks = 0
     app.add_middleware(UploadLimit, max_mb=settings.max_upload_mb)
+    app.add_middleware(Measured, metrics=metrics)
     errors.install(app)
     openapi.install(app)
-    for module in (observations, scans, categories, goals, health):
-        app.include_router(module.router)
-    app.state.made = observations.MADE | scans.MADE | categories.MADE | goals.MADE
+    for router in (
+        observations.router,
+        scans.router,
+        categories.router,
+        goals.router,
+        memory.router,
+        memory.live,
+        track.router,
+        health.router,
+    ):
+        app.include_router(router)
+    app.state.made = observations.MADE | scans.MADE | categories.MADE | goals.MADE | memory.MADE
     return app
 
 
 @contextmanager
-def open_agent(settings: Settings, backbone: Backbone | None = None) -> Iterator[Agent]:
+def open_agent(settings: Settings, backbone: Backbone | None, metrics: Metrics) -> Iterator[Agent]:
     """The agent of these settings, with its memory open until the end; loads its backbone unless one is given.
 
     Raises what `Settings.require_safe`, `Memory.open`, `load_backbone` and `Agent` raise.
     """
-    with _checked(settings, backbone) as (memory, loaded, config):
-        agent = Agent(BatchingBackbone(loaded), memory, config)
+    with _checked(settings, backbone) as (opened, loaded, config):
+        agent = Agent(BatchingBackbone(loaded, metrics.count_pass), opened, config, Events(metrics.count_event))
         try:
             yield agent
         finally:
@@ -71,8 +88,8 @@ def open_agent(settings: Settings, backbone: Backbone | None = None) -> Iterator
 
 def checked_backbone(settings: Settings) -> Backbone:
     """The backbone of these settings, once all is checked that can keep the service from starting. Raises as `open_agent` does."""
-    with _checked(settings) as (memory, loaded, _):
-        memory.require_backbone(loaded.name, loaded.fingerprint)
+    with _checked(settings) as (opened, loaded, _):
+        opened.require_backbone(loaded.name, loaded.fingerprint)
         return loaded
 
 
@@ -82,5 +99,5 @@ def _checked(settings: Settings, backbone: Backbone | None = None) -> Iterator[t
     settings.require_safe()
     config = AgentConfig(settings.score, settings.threshold, settings.variant, settings.scan_views, settings.false_known_rate)
     config.validate()
-    with Memory.open(settings.data_dir, settings.retention) as memory:
-        yield memory, backbone or load_backbone(settings.backbone, device=settings.device, report=log.info), config
+    with Memory.open(settings.data_dir, settings.retention) as opened:
+        yield opened, backbone or load_backbone(settings.backbone, device=settings.device, report=log.info), config

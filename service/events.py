@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import threading
 from collections import deque
-from collections.abc import AsyncIterator, Mapping
+from collections.abc import AsyncIterator, Callable, Mapping
 from dataclasses import dataclass
 from datetime import datetime, timezone
 from typing import Any, Literal, get_args
@@ -59,7 +59,9 @@ class _Listener:
 class Events:
     """Safe to publish to from every thread."""
 
-    def __init__(self) -> None:
+    def __init__(self, on_event: Callable[[Event], None] = lambda event: None) -> None:
+        """`on_event` is told of each event, in the thread that publishes it."""
+        self._on_event = on_event
         self._lock = threading.Lock()
         self._history: deque[Event] = deque(maxlen=HISTORY)
         self._listeners: set[_Listener] = set()
@@ -78,6 +80,7 @@ class Events:
                     listener.dropped += 1
                 listener.waiting.append(event)
                 listener.loop.call_soon_threadsafe(listener.arrived.set)
+        self._on_event(event)
 
     def close(self) -> None:
         """Ends every listening: the service stops."""

@@ -7,8 +7,10 @@ from __future__ import annotations
 
 import io
 import math
+import struct
 import zipfile
 import zlib
+from tokenize import TokenError
 from typing import IO, Any
 
 import numpy as np
@@ -51,7 +53,7 @@ def _arrays(body: bytes) -> dict[str, NDArray[Any]]:
     try:
         with zipfile.ZipFile(io.BytesIO(body)) as archive:
             return {name: _array(archive, name) for name in map(_array_name, archive.namelist())}
-    except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError) as error:
+    except (zipfile.BadZipFile, zlib.error, struct.error, EOFError, NotImplementedError, RuntimeError, ValueError) as error:
         raise InvalidInput("body", f"is not a readable npz file ({error}); write it with numpy.savez") from None
 
 
@@ -86,6 +88,6 @@ def _header(stream: IO[bytes], name: str) -> tuple[tuple[int, ...], np.dtype[Any
     try:
         version = npy.read_magic(stream)
         shape, _, dtype = HEADER_READERS[version](stream, max_header_size=MAX_HEADER_BYTES)
-    except (ValueError, KeyError) as error:
+    except (ValueError, KeyError, SyntaxError, TokenError, RecursionError) as error:  # a header is parsed as Python
         raise InvalidInput(name, f"is not a NumPy array ({error}); write the npz with numpy.savez") from None
     return shape, dtype

@@ -42,6 +42,8 @@ class Settings(BaseSettings):
     max_upload_mb: int = Field(128, gt=0, description="Largest request body, in megabytes of 1 000 000 bytes.")
     workers: int = Field(2, gt=0, description="Requests that are worked on at once; those that come together share passes of the backbone.")
     queue: int = Field(16, ge=0, description="Requests that may wait; more are answered 503 with Retry-After.")
+    max_tracks: int = Field(4, ge=0, description="Objects that are followed at once over WS /v1/track.")
+    backup_dir: Path | None = Field(None, description="Folder that backups are made in; beside the memory where left out.")
     max_views: int = Field(32, gt=0, description="Most views in one burst.")
     scan_views: int = Field(10, ge=2, le=64, description="Viewpoints that a scan asks for.")
     scan_expiry_h: float = Field(24, gt=0, description="Hours after which a scan expires that no views come for.")
@@ -52,6 +54,11 @@ class Settings(BaseSettings):
     def retention(self) -> Retention:
         """How much the memory keeps, and how long."""
         return Retention(self.keep_observations, timedelta(days=self.undo_days), timedelta(hours=self.scan_expiry_h))
+
+    @property
+    def backups(self) -> Path:
+        """Where backups are made."""
+        return self.backup_dir or self.data_dir.with_name(f"{self.data_dir.name}-backups")
 
     def require_safe(self) -> None:
         """Raises InvalidInput for settings that would expose or starve the service."""

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from service.settings import Settings
 
 log = logging.getLogger("onelook")
+GRACE_S = 5
+"""For answers under way, once it shall stop."""
 
 
 class ServeCommand(TyperCommand):
@@ -59,7 +61,8 @@ def serve(
     with _bound(settings.host, settings.port) as listener:
         # Opened once before uvicorn starts, which would wrap the sentence that says what is wrong in a traceback.
         app = create_app(settings, backbone=checked_backbone(settings))
-        server = uvicorn.Server(uvicorn.Config(app, log_config=None))
+        # Listeners to events and tracks would keep it from ending for as long as they like.
+        server = uvicorn.Server(uvicorn.Config(app, log_config=None, timeout_graceful_shutdown=GRACE_S))
         log.info("serving on http://%s:%d, memory in %s; Ctrl+C stops it", settings.host, listener.getsockname()[1], settings.data_dir)
         with contextlib.suppress(KeyboardInterrupt):
             server.run(sockets=[listener])

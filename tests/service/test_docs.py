@@ -5,8 +5,6 @@ from __future__ import annotations
 import re
 import shutil
 import subprocess
-import threading
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -14,10 +12,8 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
-import uvicorn
 
 from core.backbones.base import Features
-from service.app import create_app
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "http.md"
@@ -25,7 +21,7 @@ SCRIPT = "\n".join(re.findall(r"^```sh\n(.*?)^```", PAGE.read_text(), re.MULTILI
 
 
 @pytest.fixture
-def url(settings: Any, backbone: Any) -> Iterator[str]:
+def url(settings: Any, backbone: Any, serving: Any) -> Iterator[str]:
     """A live service that takes the middle of every image for the object."""
 
     class Middle(type(backbone)):  # type: ignore[misc]
@@ -36,14 +32,8 @@ def url(settings: Any, backbone: Any) -> Iterator[str]:
             small = cv2.resize(disc, found.attention.shape[1:], interpolation=cv2.INTER_AREA)
             return Features(found.patches, found.cls, np.stack([small] * len(images)), np.stack([disc] * len(images)))
 
-    server = uvicorn.Server(uvicorn.Config(create_app(settings, backbone=Middle()), host="127.0.0.1", port=0, log_level="warning"))
-    thread = threading.Thread(target=server.run, daemon=True)
-    thread.start()
-    while not server.started:
-        time.sleep(0.01)
-    yield f"http://127.0.0.1:{server.servers[0].sockets[0].getsockname()[1]}"
-    server.should_exit = True
-    thread.join()
+    with serving(settings, Middle()) as address:
+        yield address
 
 
 @pytest.mark.skipif(shutil.which("curl") is None, reason="needs curl")

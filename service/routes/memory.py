@@ -1,0 +1,106 @@
+"""/v1/memory: its size, and copies of it that go elsewhere; and what happens in it, as it happens."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import AsyncIterator
+from pathlib import Path
+from typing import Annotated, Any
+
+from fastapi import APIRouter, BackgroundTasks, Header, Query, Request, Response
+from fastapi.responses import FileResponse
+from fastapi.sse import EventSourceResponse, ServerSentEvent
+from starlette.exceptions import HTTPException
+
+from service.agent import Agent
+from service.deps import ActorDep, AgentDep, WorkDep, media_type
+from service.exchange import MemoryRoute
+from service.metrics import Metrics
+from service.schemas.memory import Backup, ExportQuery, Import, MemoryInfo
+from service.schemas.problem import problems
+from service.settings import Settings
+
+router = APIRouter(tags=["memory"], route_class=MemoryRoute)
+live = APIRouter(tags=["memory"])
+"""What is new at each call, and so has no ETag."""
+ARCHIVE = "application/zip"
+ARCHIVE_BODY: dict[str, Any] = {"required": True, "content": {ARCHIVE: {"schema": {"type": "string", "format": "binary"}}}}
+
+
+@live.get("/v1/memory", responses=problems(503))
+def memory(agent: AgentDep) -> MemoryInfo:
+    """What it holds, what it was made with, and how it decides."""
+    return MemoryInfo.of(agent)
+
+
+@live.post("/v1/memory/backup", status_code=201, responses=problems(409, 503))
+async def backup_memory(agent: AgentDep, work: WorkDep, request: Request) -> Backup:
+    """Copies the whole memory, while it is used, to a new folder in ONELOOK_BACKUP_DIR; the copy opens as a memory."""
+    settings: Settings = request.app.state.settings
+    return await work.run(lambda: Backup.of(agent.upkeep.backup(settings.backups)))
+
+
+@live.post(
+    "/v1/memory/export",
+    response_class=Response,
+    responses={200: {"description": "An archive", "content": {ARCHIVE: {}}}, **problems(404, 409, 422, 503)},
+)
+async def export_memory(query: Annotated[ExportQuery, Query()], agent: AgentDep, work: WorkDep, after: BackgroundTasks) -> Response:
+    """Categories, all of them or some, with their references, instances and goals, as one file for another robot's memory."""
+    folder = tempfile.TemporaryDirectory()
+    path = Path(folder.name) / "memory.zip"
+    try:
+        await work.run(lambda: agent.memory.export(path, query.category_id or None))
+    except BaseException:
+        folder.cleanup()
+        raise
+    after.add_task(folder.cleanup)
+    return FileResponse(path, media_type=ARCHIVE, filename="memory.zip", background=after)
+
+
+@router.post("/v1/memory/import", status_code=201, responses=problems(409, 413, 415, 422, 503), openapi_extra={"requestBody": ARCHIVE_BODY})
+async def import_memory(request: Request, agent: AgentDep, work: WorkDep, actor: ActorDep = None) -> Import:
+    """Takes in the categories of another memory's export: all, or none where anything is wrong; those it has already stay as they are."""
+    if media_type(request) != ARCHIVE:
+        raise HTTPException(415, f"the body is {media_type(request) or 'of no media type'}; send the file of an export as {ARCHIVE}")
+    body = await request.body()
+    return await work.run(lambda: _import(agent, body, actor))
+
+
+@live.get("/v1/events", response_class=EventSourceResponse, responses=problems(422))
+async def events(
+    agent: AgentDep,
+    after: Annotated[int | None, Query(ge=0, description="First what happened after the event with this id.")] = None,
+    last_event_id: Annotated[str | None, Header(description="The same, as browsers say it when they connect again.")] = None,
+) -> AsyncIterator[ServerSentEvent]:
+    """What happens, as server-sent events: observations, scans, changes of categories. `dropped` says how many were left out."""
+    since = int(last_event_id) if last_event_id is not None and last_event_id.isdecimal() else after
+    async for event in agent.events.listen(since):
+        yield ServerSentEvent(event=event.kind, id=str(event.id), data={"created_at": event.created_at, **event.about})
+
+
+@live.get(
+    "/metrics",
+    response_class=Response,
+    responses={200: {"description": "Prometheus's text format", "content": {"text/plain": {}}}, **problems(503)},
+)
+def metrics(agent: AgentDep, request: Request) -> Response:
+    """Figures for Prometheus."""
+    counted: Metrics = request.app.state.metrics
+    return Response(counted.text(agent.memory), media_type="text/plain; version=0.0.4")
+
+
+def imported(agent: Agent, entry_id: str) -> Import:
+    """What an import brought, from the audit trail."""
+    after = agent.memory.audit.get(entry_id).after
+    return Import.of(agent, entry_id, after["categories"], after["duplicates"])
+
+
+MADE = {"/v1/memory/import": imported}
+"""What a repeated request is answered with where its first answer was lost."""
+
+
+def _import(agent: Agent, body: bytes, actor: str | None) -> Import:
+    brought = agent.upkeep.import_archive(body, actor=actor)
+    ids, duplicates = ([each.id for each in part] for part in (brought.categories, brought.duplicates))
+    return Import.of(agent, brought.entry_id, ids, duplicates)

@@ -1,0 +1,160 @@
+"""WS /v1/track: frames in, a pose for each frame out."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from dataclasses import dataclass, field
+
+import anyio
+from anyio.to_thread import run_sync
+from fastapi import APIRouter, WebSocket, WebSocketDisconnect, status
+from pydantic import BaseModel, ValidationError
+
+from core.errors import OneLookError, Unavailable
+from service.agent import Agent
+from service.errors import problem_of, validation_problem
+from service.schemas.tracking import Announcement, Dropped, FrameAnswer, FrameMessage, Hello, Ready, TrackProblem
+from service.settings import Settings
+from service.tracker import Tracker
+from service.work import Busy, WorkQueue
+
+router = APIRouter()
+WAITING_FRAMES = 2
+"""More would only make answers late; what is dropped is told."""
+
+
+@dataclass
+class Waiting:
+    """Messages that wait to be worked on, the latest few."""
+
+    messages: deque[tuple[FrameMessage, float]] = field(default_factory=deque)
+    """With the time of their arrival."""
+    dropped: Dropped | None = None
+    """What was dropped and not told yet."""
+    arrived: anyio.Event = field(default_factory=anyio.Event)
+    closed: bool = False
+
+    def put(self, message: FrameMessage, arrived_s: float) -> None:
+        """Drops the oldest where there are too many."""
+        if len(self.messages) >= WAITING_FRAMES:
+            self.drop(self.messages.popleft()[0].id)
+        self.messages.append((message, arrived_s))
+        self.arrived.set()
+
+    def drop(self, frame_id: int) -> None:
+        """Counts a frame that is not worked on."""
+        before = self.dropped
+        self.dropped = Dropped(
+            frames=(before.frames if before else 0) + 1, first_id=before.first_id if before else frame_id, last_id=frame_id
+        )
+
+    async def take(self) -> tuple[FrameMessage, float] | None:
+        """The oldest that waits, as soon as there is one; None at the end."""
+        while not self.messages:
+            if self.closed:
+                return None
+            await self.arrived.wait()
+            self.arrived = anyio.Event()
+        return self.messages.popleft()
+
+    def close(self) -> None:
+        """No more will come."""
+        self.closed = True
+        self.arrived.set()
+
+
+@router.websocket("/v1/track")
+async def track(socket: WebSocket) -> None:
+    """Follows one object through frames; docs/http.md tells the messages."""
+    await socket.accept()
+    state = socket.app.state
+    settings: Settings = state.settings
+    if state.tracks >= settings.max_tracks:
+        error = Unavailable(f"{state.tracks} objects are followed already (ONELOOK_MAX_TRACKS); end one, or try again later")
+        await _refuse(socket, error, status.WS_1013_TRY_AGAIN_LATER)
+        return
+    state.tracks += 1
+    try:
+        tracker = await _greet(socket, state.agent)
+        if tracker is not None:
+            await _follow(socket, tracker, state.agent, state.work)
+    except WebSocketDisconnect:
+        pass
+    finally:
+        state.tracks -= 1
+
+
+async def _greet(socket: WebSocket, agent: Agent) -> Tracker | None:
+    """The tracker that `hello` asks for; None where it is refused."""
+    try:
+        hello = Hello.model_validate_json(await _text(socket))
+        tracker = await run_sync(lambda: Tracker(agent, hello.options()))
+    except (ValidationError, OneLookError) as error:
+        await _refuse(socket, error, status.WS_1008_POLICY_VIOLATION)
+        return None
+    await _send(socket, Ready(category_id=tracker.category_id, window=hello.window, weight=hello.weight))
+    return tracker
+
+
+async def _follow(socket: WebSocket, tracker: Tracker, agent: Agent, work: WorkQueue) -> None:
+    waiting = Waiting()
+    async with anyio.create_task_group() as tasks:
+        tasks.start_soon(_answer_frames, socket, tracker, agent, work, waiting)
+        try:
+            while True:
+                await _receive(socket, waiting)
+        except WebSocketDisconnect:
+            waiting.messages.clear()
+            waiting.close()
+
+
+async def _receive(socket: WebSocket, waiting: Waiting) -> None:
+    text = await _text(socket)
+    try:
+        waiting.put(FrameMessage.model_validate_json(text), time.monotonic())
+    except ValidationError as error:
+        await _send(socket, TrackProblem(frame_id=None, problem=validation_problem(error.errors())))
+
+
+async def _answer_frames(socket: WebSocket, tracker: Tracker, agent: Agent, work: WorkQueue, waiting: Waiting) -> None:
+    try:
+        while (taken := await waiting.take()) is not None:
+            message, arrived_s = taken
+            if waiting.dropped is not None:
+                told, waiting.dropped = waiting.dropped, None
+                await _send(socket, told)
+            try:
+                update = await work.run(lambda message=message, at=arrived_s: tracker.step(message.decode(at)))  # type: ignore[misc]
+            except Busy:
+                waiting.drop(message.id)
+                continue
+            except OneLookError as error:
+                await _send(socket, TrackProblem(frame_id=message.id, problem=problem_of(error)))
+                continue
+            for kind, happened in (("found", update.found), ("lost", update.lost)):
+                if happened:
+                    await _send(socket, Announcement(type=kind, frame_id=update.frame_id))
+            names = await run_sync(agent.names) if update.decision else {}
+            await _send(socket, FrameAnswer.of(update, tracker.category_id, names, (time.monotonic() - arrived_s) * 1e3))
+    except (WebSocketDisconnect, RuntimeError):  # it went away while it was being answered
+        waiting.close()
+
+
+async def _text(socket: WebSocket) -> str:
+    """The next message. Raises WebSocketDisconnect."""
+    message = await socket.receive()
+    if message["type"] == "websocket.disconnect":
+        raise WebSocketDisconnect(message.get("code", status.WS_1000_NORMAL_CLOSURE))
+    return str(message.get("text") or "")
+
+
+async def _send(socket: WebSocket, message: BaseModel) -> None:
+    """Waits while the other side does not take it: meanwhile frames are dropped, not queued."""
+    await socket.send_text(message.model_dump_json())
+
+
+async def _refuse(socket: WebSocket, error: ValidationError | OneLookError, code: int) -> None:
+    problem = validation_problem(error.errors()) if isinstance(error, ValidationError) else problem_of(error)
+    await _send(socket, TrackProblem(frame_id=None, problem=problem))
+    await socket.close(code)

@@ -1,0 +1,118 @@
+"""The memory as a whole over HTTP."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from pathlib import Path
+
+import pytest
+from fastapi.testclient import TestClient
+
+from service.app import create_app
+from store.memory import Memory
+
+ZIP = {"content-type": "application/zip"}
+
+
+@pytest.fixture
+def other(settings, backbone, tmp_path):
+    """Another robot's service, with an empty memory."""
+    with TestClient(create_app(settings.model_copy(update={"data_dir": tmp_path / "other"}), backbone=backbone)) as client:
+        yield client
+
+
+def asked(client, parts, burst):
+    """What is answered about a burst, less what is new at each asking."""
+    seen = client.post("/v1/observations", files=parts(burst), params={"learn": False}).json()
+    return {name: seen[name] for name in ("outcome", "name", "pose")} | {
+        "similarity": [each["similarity"] for each in seen["similarities"]]
+    }
+
+
+def test_the_memory_says_what_it_holds(client, look, parts, learn):
+    before = client.get("/v1/memory").json()
+    learn()
+    after = client.get("/v1/memory").json()
+    assert (before["categories"], before["instances"]) == (0, 0)
+    assert (after["categories"], after["instances"], after["observations"], after["backbone"]) == (1, 1, 1, "colour")
+    assert after["version"] > before["version"]
+    assert after["size_bytes"] > before["size_bytes"]
+
+
+def test_two_memories_exported_and_imported_into_each_other_answer_alike(client, other, look, parts, learn):
+    learn("bright", "ball")
+    scan = other.post("/v1/scans", files=parts(look("dark"))).json()
+    other.post(f"/v1/scans/{scan['id']}/views", files=parts(look("dark")))
+    other.post(f"/v1/scans/{scan['id']}/complete", json={"name": "stone"})
+    archives = [each.post("/v1/memory/export") for each in (client, other)]
+    for target, archive, name in zip((other, client), archives, ("ball", "stone")):
+        brought = target.post("/v1/memory/import", content=archive.content, headers=ZIP)
+        assert brought.status_code == 201, brought.text
+        assert [category["name"] for category in brought.json()["categories"]] == [name]
+        assert (brought.json()["duplicates"], brought.json()["same_name"]) == ([], [])
+    for kind in ("bright", "dark"):
+        first, second = (asked(each, parts, look(kind, views=4)) for each in (client, other))
+        assert first["outcome"] == "known"
+        assert first == second
+
+
+def test_importing_twice_brings_duplicates_only(client, other, learn):
+    category = learn("bright", "ball")
+    archive = client.post("/v1/memory/export").content
+    other.post("/v1/memory/import", content=archive, headers=ZIP)
+    again = other.post("/v1/memory/import", content=archive, headers=ZIP).json()
+    assert again["categories"] == []
+    assert [each["name"] for each in again["duplicates"]] == [category["name"]]
+    assert len(other.get("/v1/categories").json()["categories"]) == 1
+
+
+def test_names_that_two_have_are_told(client, other, look, parts, learn):
+    learn("bright", "ball")
+    archive = client.post("/v1/memory/export").content
+    scan = other.post("/v1/scans", files=parts(look("dark"))).json()
+    other.post(f"/v1/scans/{scan['id']}/views", files=parts(look("dark")))
+    other.post(f"/v1/scans/{scan['id']}/complete", json={"name": "ball"})
+    assert other.post("/v1/memory/import", content=archive, headers=ZIP).json()["same_name"] == ["ball"]
+
+
+def test_a_repeated_import_is_done_once_even_if_its_answer_was_lost(client, other, learn):
+    learn("bright", "ball")
+    archive, headers = client.post("/v1/memory/export").content, ZIP | {"Idempotency-Key": "i1"}
+    first = other.post("/v1/memory/import", content=archive, headers=headers).json()
+    with other.app.state.agent.memory._connection.housekeeping() as db:
+        db.execute("UPDATE requests SET status = NULL, media_type = NULL, body = NULL")
+    assert other.post("/v1/memory/import", content=archive, headers=headers).json() == first
+
+
+def test_some_categories_can_be_exported(client, other, learn):
+    _, second = learn("bright", "ball"), learn("dark", "stone")
+    archive = client.post("/v1/memory/export", params={"category_id": [second["id"]]}).content
+    brought = other.post("/v1/memory/import", content=archive, headers=ZIP).json()
+    assert [category["name"] for category in brought["categories"]] == ["stone"]
+
+
+def test_what_cannot_be_exported_or_imported(client, other, learn):
+    assert client.post("/v1/memory/export", params={"category_id": ["nope"]}).status_code == 404
+    assert client.post("/v1/memory/export").status_code == 409
+    learn()
+    archive = client.post("/v1/memory/export").content
+    for body in (b"", b"no zip", archive[: len(archive) // 2]):
+        assert other.post("/v1/memory/import", content=body, headers=ZIP).status_code == 422
+    assert other.post("/v1/memory/import", content=archive).status_code == 415
+    strange = io.BytesIO()
+    with zipfile.ZipFile(strange, "w") as file:
+        file.writestr("../../escape", b"x")
+    assert other.post("/v1/memory/import", content=strange.getvalue(), headers=ZIP).status_code == 422
+    assert other.get("/v1/categories").json() == {"categories": []}
+
+
+def test_a_backup_opens_as_a_memory(client, settings, learn):
+    category = learn("bright", "ball")
+    answer = client.post("/v1/memory/backup")
+    assert answer.status_code == 201
+    made = answer.json()
+    assert (Path(made["folder"]).parent, made["damages"]) == (settings.backups, [])
+    with Memory.open(Path(made["folder"])) as copy:
+        assert [each.id for each in copy.categories.all()] == [category["id"]]
+    assert client.post("/v1/memory/backup").json()["folder"] != made["folder"]

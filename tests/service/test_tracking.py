@@ -1,0 +1,229 @@
+"""WS /v1/track: a pose for each frame, found and lost announced, slow sides told."""
+
+from __future__ import annotations
+
+import base64
+import json
+import threading
+
+import anyio
+import cv2
+import numpy as np
+import pytest
+from fastapi.testclient import TestClient
+from scipy.spatial.transform import Rotation
+from starlette.websockets import WebSocketDisconnect
+
+from core.scan import hemisphere
+from core.sim3 import Sim3, rotation_angle_deg
+from service.app import create_app
+from service.routes.track import WAITING_FRAMES, Waiting
+
+UP = np.array([0.0, 0.0, 1.0])
+PLACED = Sim3(1.0, Rotation.from_euler("z", 50, degrees=True).as_matrix(), np.array([0.3, -0.1, 0.05]))
+MOVED = Sim3(1.0, PLACED.rotation, np.array([0.8, 0.4, 0.05]))
+
+
+def png(image):
+    return base64.b64encode(cv2.imencode(".png", image)[1].tobytes()).decode()
+
+
+def message(number, view, **changes):
+    """One view as a frame."""
+    return {
+        "type": "frame",
+        "id": number,
+        "time_s": number / 10,
+        "K": view.camera.K.tolist(),
+        "world_from_camera": view.camera.world_from_camera.tolist(),
+        "rgb": png(view.rgb[..., ::-1]),
+        "depth": png(np.round(view.depth_m * 1000).astype(np.uint16)),
+    } | changes
+
+
+@pytest.fixture
+def camera_round(look):
+    """camera_round(placed, count): views of a camera that goes round an object."""
+
+    def views(placed, count=6, kind="bright"):
+        poses = hemisphere(placed.translation, UP, 0.5, 12)[:count]
+        return look(kind, world_from_object=placed, poses=poses).views
+
+    return views
+
+
+@pytest.fixture
+def category(learn):
+    return learn("bright", "ball")
+
+
+@pytest.fixture
+def track(client):
+    """track(messages, hello): what is answered to messages sent one by one, each when the one before was answered."""
+
+    def talk(messages, **hello):
+        answers = []
+        with client.websocket_connect("/v1/track") as socket:
+            socket.send_json({"type": "hello"} | hello)
+            answers.append(socket.receive_json())
+            for each in messages:
+                socket.send_json(each)
+                answers.append(socket.receive_json())
+                while answers[-1]["type"] in {"found", "lost", "dropped"}:
+                    answers.append(socket.receive_json())
+        return answers
+
+    return talk
+
+
+def kinds(answers):
+    return [answer["type"] for answer in answers]
+
+
+def test_every_frame_gets_a_pose_that_is_near_the_truth(track, category, camera_round):
+    answers = track([message(*each) for each in enumerate(camera_round(PLACED))], category_id=category["id"])
+    assert answers[0] == {"type": "ready", "category_id": category["id"], "window": 5, "weight": 0.5}
+    assert kinds(answers[1:]) == ["found"] + ["pose"] * 6
+    assert [answer["frame_id"] for answer in answers[2:]] == [0, 1, 2, 3, 4, 5]
+    assert [answer["views"] for answer in answers[2:]] == [1, 2, 3, 4, 5, 5]
+    last = answers[-1]["pose"]
+    matrix = np.array(last["target_from_reference"]["matrix"])
+    assert rotation_angle_deg(matrix[:3, :3] / last["target_from_reference"]["scale"], PLACED.rotation) < 5
+    assert np.linalg.norm(np.array(last["world_from_object"])[:2, 3] - PLACED.translation[:2]) < 0.02
+    assert answers[-1]["measured"]
+    assert answers[-1]["latency_ms"] > 0
+
+
+def test_the_age_of_a_pose_is_told(track, category, camera_round):
+    views = [message(*each) for each in enumerate(camera_round(PLACED))]
+    plain = track(views, category_id=category["id"], weight=1)
+    assert [answer["data_age_s"] for answer in plain[2:]] == pytest.approx([0, 0.05, 0.1, 0.15, 0.2, 0.2])
+    smoothed = track(views, category_id=category["id"], weight=0.25)
+    assert smoothed[-1]["data_age_s"] > plain[-1]["data_age_s"]
+    assert track(views, category_id=category["id"], weight=1, window=1)[-1]["data_age_s"] == 0
+
+
+def test_the_category_is_decided_where_hello_names_none(track, category, camera_round):
+    answers = track([message(*each) for each in enumerate(camera_round(PLACED, 3))], window=3)
+    assert answers[0]["category_id"] is None
+    decided = next(answer for answer in answers if answer["type"] == "pose")
+    assert (decided["outcome"], decided["similarities"][0]["name"]) == ("known", "ball")
+    assert answers[-1]["category_id"] == category["id"]
+    assert (answers[-1]["outcome"], answers[-1]["similarities"]) == (None, [])
+
+
+def test_an_object_of_no_category_gets_no_pose(track, category, camera_round):
+    answers = track([message(*each) for each in enumerate(camera_round(PLACED, 2, "dark"))])
+    assert kinds(answers[1:]) == ["pose", "pose"]
+    assert answers[-1]["pose"] is None
+    assert (answers[-1]["outcome"], "no category" in answers[-1]["reason"]) == ("novel", True)
+
+
+def test_a_lost_object_is_held_for_a_while_then_announced_and_found_again(track, category, camera_round):
+    seen = camera_round(PLACED, 3)
+    blank = [message(number, seen[0], rgb=png(np.zeros((160, 160, 3), np.uint8))) for number in (3, 4, 5)]
+    frames = [*(message(*each) for each in enumerate(seen)), *blank, message(6, seen[0])]
+    answers = track(frames, category_id=category["id"])
+    assert kinds(answers[1:]) == ["found", "pose", "pose", "pose", "pose", "pose", "lost", "pose", "found", "pose"]
+    held, last_blank = answers[5], answers[8]
+    assert (held["measured"], held["pose"] is not None, held["reason"] is not None) == (False, True, True)
+    assert held["data_age_s"] > answers[4]["data_age_s"]
+    assert (last_blank["pose"], last_blank["data_age_s"]) == (None, None)
+
+
+def test_a_moved_object_is_followed_once_its_new_place_is_sure(track, category, camera_round):
+    views = [*camera_round(PLACED, 4), *camera_round(MOVED, 10)]
+    answers = [
+        each
+        for each in track([message(*each) for each in enumerate(views)], category_id=category["id"], window=3)
+        if each["type"] == "pose"
+    ]
+    places = np.array([answer["pose"]["world_from_object"] for answer in answers])[:, :2, 3]
+    assert np.linalg.norm(places[3] - PLACED.translation[:2]) < 0.03
+    assert np.linalg.norm(places[-1] - MOVED.translation[:2]) < 0.03
+    assert not all(answer["measured"] for answer in answers[4:])
+
+
+@pytest.mark.parametrize(
+    ("changes", "field"),
+    [
+        ({"rgb": "no base64!"}, "rgb"),
+        ({"rgb": base64.b64encode(b"no image").decode()}, "rgb"),
+        ({"K": None}, "K"),
+        ({"world_from_camera": [[1, 2], [3, 4]]}, "world_from_camera"),
+        ({"time_s": -1}, "time_s"),
+        ({"surprise": 1}, "surprise"),
+    ],
+)
+def test_a_frame_that_cannot_be_used_is_told_and_the_next_is_answered(track, category, camera_round, changes, field):
+    views = camera_round(PLACED, 3)
+    answers = track([message(0, views[0]), message(1, views[1], **changes), message(2, views[2])], category_id=category["id"])
+    problem = answers[3]
+    assert (problem["type"], problem["problem"]["status"], problem["problem"]["field"]) == ("problem", 422, field)
+    assert (answers[4]["type"], answers[4]["frame_id"]) == ("pose", 2)
+
+
+@pytest.mark.parametrize(
+    ("hello", "status"),
+    [({"type": "frame"}, 422), ({"category_id": "nope"}, 404), ({"variant": "nonsense"}, 422), ({"window": 0}, 422), ({"weight": 0}, 422)],
+)
+def test_a_wrong_hello_is_refused(client, hello, status):
+    with client.websocket_connect("/v1/track") as socket:
+        socket.send_json({"type": "hello"} | hello)
+        problem = socket.receive_json()
+        with pytest.raises(WebSocketDisconnect) as closed:
+            socket.receive_json()
+    assert (problem["type"], problem["problem"]["status"], closed.value.code) == ("problem", status, 1008)
+
+
+def test_no_more_are_followed_than_set(settings, backbone):
+    with TestClient(create_app(settings.model_copy(update={"max_tracks": 1}), backbone=backbone)) as client:
+        with client.websocket_connect("/v1/track") as first:
+            first.send_json({"type": "hello"})
+            assert first.receive_json()["type"] == "ready"
+            with client.websocket_connect("/v1/track") as second:
+                assert "ONELOOK_MAX_TRACKS" in second.receive_json()["problem"]["detail"]
+        with client.websocket_connect("/v1/track") as third:
+            third.send_json({"type": "hello"})
+            assert third.receive_json()["type"] == "ready"
+
+
+def test_frames_that_come_too_fast_are_dropped_oldest_first_and_told(settings, backbone, look, parts, camera_round):
+    gate, entered = threading.Event(), threading.Event()
+
+    class Slow(type(backbone)):
+        def extract(self, images):
+            entered.set()
+            gate.wait(10)
+            return super().extract(images)
+
+    views = camera_round(PLACED, 8)
+    with TestClient(create_app(settings, backbone=Slow())) as client, client.websocket_connect("/v1/track") as socket:
+        socket.send_json({"type": "hello"})
+        socket.receive_json()
+        socket.send_json(message(0, views[0]))
+        entered.wait(10)
+        for number in range(1, 8):
+            socket.send_json(message(number, views[number]))
+        socket.send_text(json.dumps({"type": "end"}))  # answered at once, so all frames have arrived then
+        assert socket.receive_json()["type"] == "problem"
+        gate.set()
+        answers = [socket.receive_json() for _ in range(4)]
+    assert (answers[0]["type"], answers[0]["frame_id"]) == ("pose", 0)
+    assert answers[1] == {"type": "dropped", "frames": 7 - WAITING_FRAMES, "first_id": 1, "last_id": 7 - WAITING_FRAMES}
+    assert [answer["frame_id"] for answer in answers[2:]] == [6, 7]
+
+
+def test_what_waits_is_bounded():
+    async def flood():
+        waiting = Waiting()
+        for number in range(1000):
+            waiting.put(type("Message", (), {"id": number})(), 0.0)
+        assert len(waiting.messages) == WAITING_FRAMES
+        assert (waiting.dropped.frames, waiting.dropped.first_id, waiting.dropped.last_id) == (998, 0, 997)
+        taken = [await waiting.take() for _ in range(WAITING_FRAMES)]
+        assert [each[0].id for each in taken] == [998, 999]
+        waiting.close()
+        assert await waiting.take() is None
+
+    anyio.run(flood)
