@@ -88,7 +88,7 @@ class Agent:
         self.encoder = Encoder(backbone)
         self.scanning = Scanning(self.encoder, memory, self.events, config.scan_views)
         self.curation = Curation(self.encoder, memory, self.events, config.score)
-        self.upkeep = Upkeep(memory, self.events)
+        self.upkeep = Upkeep(memory, self.events, config.score, config.threshold, config.false_known_rate)
         self.rearranging = Rearranging(self.observe_known, memory, self.events)
 
     def observe(self, burst: Burst, options: ObserveOptions | None = None, *, frame: str | None = None) -> Observation:
@@ -131,6 +131,10 @@ class Agent:
         """The pose of an object that is known to be of a category; nothing is learnt."""
         return self.observe(burst, ObserveOptions(category_id, learn=False), frame=frame)
 
+    def decide(self, encoded: EncodedBurst, seed: int = 0) -> Decision:
+        """What a burst is taken for, without keeping or learning anything."""
+        return self._judge(Judge(self.memory, encoded, self.backbone.whitening, seed), ObserveOptions(learn=False)).decision
+
     def names(self) -> dict[str, str | None]:
         """Of all categories, by id."""
         return {category.id: category.name for category in self.memory.categories.all()}
@@ -147,7 +151,7 @@ class Agent:
 
     def _judge(self, judge: Judge, options: ObserveOptions) -> Judgement:
         threshold = self.config.threshold if options.threshold is None else options.threshold
-        rate = self.config.false_known_rate if options.false_known_rate is None else options.false_known_rate
+        rate = self.upkeep.false_known_rate if options.false_known_rate is None else options.false_known_rate
         judged = judge.judge(DecisionConfig(self.config.score, threshold, rate))
         return judged if options.learn else replace(judged, decision=replace(judged.decision, rival=None))
 

@@ -1,23 +1,76 @@
-"""The memory as a whole: backups, and what comes from other memories."""
+"""The memory as a whole: how readily it calls objects known, backups, and what comes from other memories."""
 
 from __future__ import annotations
 
 import tempfile
+from dataclasses import dataclass
 from datetime import datetime, timezone
 from pathlib import Path
 
+from core.calibration import Calibration, Prior
+from core.errors import Conflict
+from core.novelty import BEST
 from service.events import Events
+from service.judgement import CALIBRATED_BY
 from store.backup import Backup
 from store.imports import Import
 from store.memory import Memory
+
+RATE = "false_known_rate"
+"""Setting of the memory."""
+
+
+@dataclass(frozen=True)
+class Thresholds:
+    """What the decision asks for at present; it changes with each decision."""
+
+    false_known_rate: float
+    tokens: float
+    """Least evidence of a known object, of a burst without depth or cameras."""
+    verified: float
+    """The same where poses were tried."""
+    decisions: int
+    """Own decisions that they are made of, beside the shipped ones."""
 
 
 class Upkeep:
     """Of one memory."""
 
-    def __init__(self, memory: Memory, events: Events) -> None:
+    def __init__(self, memory: Memory, events: Events, score: str, threshold: float | None, false_known_rate: float) -> None:
+        """Score, threshold and rate are those of the settings."""
         self._memory = memory
         self._events = events
+        self._score = score
+        self._threshold = threshold
+        self._false_known_rate = false_known_rate
+
+    @property
+    def false_known_rate(self) -> float:
+        """Of objects of no known category, how many may be called known: what the memory was calibrated to, else the setting."""
+        kept = self._memory.setting(RATE)
+        return self._false_known_rate if kept is None else float(kept)
+
+    def calibrate(self, false_known_rate: float | None) -> Thresholds:
+        """Keeps a rate with the memory; None goes back to the setting's. Raises Conflict where thresholds are not made of a rate."""
+        if self._threshold is not None:
+            raise Conflict(f"ONELOOK_THRESHOLD sets the threshold to {self._threshold}; start without it to have it made of a rate")
+        if self._score != BEST:
+            raise Conflict(f"the score {self._score} has a threshold of its own; ONELOOK_SCORE={BEST} has one that is made of a rate")
+        self._memory.keep_setting(RATE, false_known_rate)
+        self._events.publish("memory_calibrated", false_known_rate=self.false_known_rate)
+        return self.thresholds()
+
+    def thresholds(self) -> Thresholds:
+        """As they are now."""
+        past = self._memory.observations.decisions(CALIBRATED_BY)
+        rate, prior = self.false_known_rate, Prior.shipped()
+        tokens, verified = ([each.rival for each in past if each.rival is not None and each.verified is kind] for kind in (False, True))
+        return Thresholds(
+            rate,
+            Calibration.fit(tokens, prior.tokens).threshold(rate),
+            Calibration.fit(verified, prior.verified).threshold(rate),
+            len(tokens) + len(verified),
+        )
 
     def backup(self, parent: Path) -> Backup:
         """Copies the memory, while it is used, to a new folder in `parent`, called by time and version. Raises Conflict and Unavailable."""

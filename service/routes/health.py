@@ -35,7 +35,7 @@ def info(agent: AgentDep) -> Info:
         fingerprint=agent.backbone.fingerprint,
         score=agent.config.score,
         threshold=agent.config.threshold,
-        false_known_rate=agent.config.false_known_rate,
+        false_known_rate=agent.upkeep.false_known_rate,
         variant=agent.config.variant,
         categories=len(agent.memory.categories.all()),
         memory_version=agent.memory.version,

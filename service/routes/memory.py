@@ -16,7 +16,7 @@ from service.agent import Agent
 from service.deps import ActorDep, AgentDep, WorkDep, media_type
 from service.exchange import MemoryRoute
 from service.metrics import Metrics
-from service.schemas.memory import Backup, ExportQuery, Import, MemoryInfo
+from service.schemas.memory import Backup, Calibrate, ExportQuery, Import, MemoryInfo, Thresholds
 from service.schemas.problem import problems
 from service.settings import Settings
 
@@ -31,6 +31,12 @@ ARCHIVE_BODY: dict[str, Any] = {"required": True, "content": {ARCHIVE: {"schema"
 def memory(agent: AgentDep) -> MemoryInfo:
     """What it holds, what it was made with, and how it decides."""
     return MemoryInfo.of(agent)
+
+
+@router.post("/v1/memory/calibrate", responses=problems(409, 422, 503))
+def calibrate_memory(calibrate: Calibrate, agent: AgentDep) -> Thresholds:
+    """Keeps with the memory how many objects of no known category it may call known, and answers the thresholds that this makes."""
+    return Thresholds.of(agent.upkeep.calibrate(calibrate.false_known_rate))
 
 
 @live.post("/v1/memory/backup", status_code=201, responses=problems(409, 503))

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from service import upkeep
 from service.agent import Agent
 from service.schemas.categories import Category
 from store import backup
@@ -18,7 +19,8 @@ class MemoryInfo(BaseModel):
     backbone: str | None = Field(examples=["dinov2-s14"])
     fingerprint: str | None = Field(description="Of the backbone's weights, layer and preprocessing.")
     score: str = Field(description="How similar two bursts are, for the decision.")
-    threshold: float = Field(description="Least similarity of a known object, where a request names none.")
+    threshold: float | None = Field(description="Least similarity of a known object; null where the score or the rate decides.")
+    false_known_rate: float = Field(description="Of objects of no known category, the share that may be called known.", examples=[0.01])
     categories: int
     instances: int = Field(description="Bursts assigned to categories.")
     observations: int = Field(description="Kept ones.")
@@ -35,7 +37,8 @@ class MemoryInfo(BaseModel):
             backbone=agent.memory.backbone,
             fingerprint=agent.memory.fingerprint,
             score=agent.config.score,
-            threshold=agent.threshold,
+            threshold=agent.config.threshold,
+            false_known_rate=agent.upkeep.false_known_rate,
             categories=sizes.categories,
             instances=sizes.instances,
             observations=sizes.observations,
@@ -43,6 +46,30 @@ class MemoryInfo(BaseModel):
             goals=sizes.goals,
             size_bytes=sizes.size,
         )
+
+
+class Calibrate(BaseModel):
+    """How often the memory may be wrong."""
+
+    model_config = ConfigDict(extra="forbid", json_schema_extra={"example": {"false_known_rate": 0.02}})
+
+    false_known_rate: float | None = Field(
+        gt=0, lt=0.5, description="Of objects of no known category, the share that may be called known; null: ONELOOK_FALSE_KNOWN_RATE."
+    )
+
+
+class Thresholds(BaseModel):
+    """What the decision asks for at present; each decision moves it a little."""
+
+    false_known_rate: float
+    tokens: float = Field(description="Least similarity of a known object, of bursts without depth or cameras.")
+    verified: float = Field(description="The same of bursts whose poses could be tried.")
+    decisions: int = Field(description="Of this memory, that they are made of beside the shipped ones.")
+
+    @staticmethod
+    def of(found: upkeep.Thresholds) -> Thresholds:
+        """From the agent's answer."""
+        return Thresholds(false_known_rate=found.false_known_rate, tokens=found.tokens, verified=found.verified, decisions=found.decisions)
 
 
 class Backup(BaseModel):

@@ -23,6 +23,13 @@ OF_A_SCAN = {"add_views": "add", "complete_scan": "complete", "exclude_viewpoint
 ELSEWHERE = {
     ("GET", "/healthz"): "for whoever watches the process",
     ("GET", "/readyz"): "for whoever watches the process",
+    ("GET", "/metrics"): "for whoever watches the process",
+    ("GET", "/v1/events"): "a stream, not an answer",
+    ("GET", "/v1/memory"): "for whoever keeps the memory",
+    ("POST", "/v1/memory/backup"): "for whoever keeps the memory",
+    ("POST", "/v1/memory/calibrate"): "for whoever keeps the memory",
+    ("POST", "/v1/memory/export"): "for whoever keeps the memory",
+    ("POST", "/v1/memory/import"): "for whoever keeps the memory",
 }
 """Endpoints that no robot asks."""
 

@@ -19,7 +19,7 @@ def collect(events, count, after=None, meanwhile=lambda: None):
         listening = events.listen(after)
         first = asyncio.ensure_future(anext(listening))
         await asyncio.sleep(0)
-        await asyncio.to_thread(meanwhile)
+        meanwhile()
         found = [await asyncio.wait_for(first, 5)]
         while len(found) < count:
             found.append(await asyncio.wait_for(anext(listening), 5))

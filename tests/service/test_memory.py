@@ -116,3 +116,28 @@ def test_a_backup_opens_as_a_memory(client, settings, learn):
     with Memory.open(Path(made["folder"])) as copy:
         assert [each.id for each in copy.categories.all()] == [category["id"]]
     assert client.post("/v1/memory/backup").json()["folder"] != made["folder"]
+
+
+def test_a_rate_is_kept_with_the_memory_and_makes_the_thresholds(settings, backbone):
+    with TestClient(create_app(settings.model_copy(update={"threshold": None, "score": "best"}), backbone=backbone)) as client:
+        often, seldom = (client.post("/v1/memory/calibrate", json={"false_known_rate": rate}).json() for rate in (0.2, 0.01))
+        assert (often["false_known_rate"], often["decisions"]) == (0.2, 0)
+        assert often["tokens"] < seldom["tokens"]
+        assert often["verified"] < seldom["verified"]
+        client.post("/v1/memory/calibrate", json={"false_known_rate": 0.1})
+    with TestClient(create_app(settings.model_copy(update={"threshold": None, "score": "best"}), backbone=backbone)) as client:
+        assert client.get("/v1/memory").json()["false_known_rate"] == client.get("/v1/info").json()["false_known_rate"] == 0.1
+        default = client.post("/v1/memory/calibrate", json={"false_known_rate": None}).json()
+        assert default["false_known_rate"] == settings.false_known_rate
+
+
+@pytest.mark.parametrize("setting", [{"threshold": 0.5}, {"score": "paper_mean"}])
+def test_a_threshold_that_is_set_is_not_made_of_a_rate(settings, backbone, setting):
+    with TestClient(create_app(settings.model_copy(update=setting), backbone=backbone)) as client:
+        assert client.post("/v1/memory/calibrate", json={"false_known_rate": 0.1}).status_code == 409
+
+
+@pytest.mark.parametrize("rate", [0, 0.5, "often"])
+def test_a_rate_is_a_share(client, rate):
+    answer = client.post("/v1/memory/calibrate", json={"false_known_rate": rate})
+    assert (answer.status_code, answer.json()["field"]) == (422, "false_known_rate")
