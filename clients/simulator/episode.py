@@ -1,4 +1,4 @@
-"""An episode: a robot with an empty memory meets objects one by one (paper, "Continual category learning").
+"""An episode: a robot meets objects one by one (paper, "Continual category learning").
 
 Everything that is scored comes from the service's answers; the ground truth stays with the simulator.
 """
@@ -6,197 +6,194 @@ Everything that is scored comes from the service's answers; the ground truth sta
 from __future__ import annotations
 
 import random
+import threading
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from enum import Enum
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from clients.answers import Category
-from clients.datasets import folders
 from clients.errors import ClientError, ServiceProblem
-from clients.pose_error import NO_POSE, PoseError, accuracy, median, pose_error
-from clients.robot import Observation, RobotClient, Scan
-from clients.simulator.replay import ReplayWorld
-from core.views import Burst
+from clients.pose_error import PoseError, pose_error
+from clients.robot import Observation, RobotClient
+from clients.simulator.arm import FREE, Arm, ArmConfig
+from clients.simulator.encounter import Encounter, Founder, Verdict, best_view, judge
+from clients.simulator.world import Subject, WorldObject
+from core.views import Burst, FloatArray
+
+MOST_LOOKS = 3
+"""Observations of one object at most: after two rounds of further views a robot goes on."""
 
 
-class Verdict(Enum):
-    """What a decision was worth, given the true categories."""
+@dataclass
+class Truth:
+    """Which true object founded each of the service's categories; shared by all robots of one memory."""
 
-    NEW = "new category"
-    """Novel, and rightly so."""
-    RECOGNISED = "recognised"
-    """Known, as the category that an object of the same kind founded."""
-    FALSE_NOVEL = "false novel"
-    """Novel, though its category is in the memory."""
-    FALSE_KNOWN = "false known"
-    """Known as a category that another kind of object founded."""
-    UNDECIDED = "undecided"
+    founders: dict[str, Founder] = field(default_factory=dict)
+    lock: threading.Lock = field(default_factory=threading.Lock)
 
-    @property
-    def right(self) -> bool:
-        """Whether the memory got it right."""
-        return self in {Verdict.NEW, Verdict.RECOGNISED}
+    def founder(self, category_id: str | None) -> Founder | None:
+        """Who founded a category."""
+        with self.lock:
+            return self.founders.get(category_id or "")
+
+    def has(self, category: str) -> bool:
+        """Whether an object of a true category founded one."""
+        with self.lock:
+            return any(each.category == category for each in self.founders.values())
+
+    def add(self, category_id: str, founder: Founder) -> None:
+        """Says who founded a new category."""
+        with self.lock:
+            self.founders[category_id] = founder
 
 
-@dataclass(frozen=True, eq=False)
-class Encounter:
-    """One object met, what the service answered, and what that was worth."""
+@dataclass(frozen=True)
+class Conduct:
+    """How a robot goes about an episode."""
 
-    number: int
-    """From 1, in the order met."""
-    sequence: folders.Sequence
-    burst: Burst
-    observation: Observation
-    in_memory: bool
-    """Whether an object of its category had founded one before."""
-    verdict: Verdict
-    kind: str | None
-    """True category of the object that founded the category decided for; None where there is none."""
-    error: PoseError | None
-    """Of the pose of a rightly recognised object."""
-    learnt: Category | None
-    """The category that the scan of a novel object made."""
-    offsets_deg: tuple[float, ...]
-    """How far off the views brought to the scan were from those asked for."""
-    failure: str | None
-    """Why there is no pose or no category where there should be one."""
-    observe_ms: float
-    """From sending the burst to having the answer."""
-    scan_ms: float | None
+    views: int = 8
+    """In the burst of each encounter."""
+    seed: int = 0
+    """Of the viewpoints and of what is lost."""
+    arm: ArmConfig = FREE
+    lost_views: float = 0.0
+    """Share of views that never arrive: a fault to be lived with."""
 
 
 class Episode:
-    """Meets `sequences` in order; remembers which true category founded each category of the service's."""
+    """Meets subjects in order; `done` are the encounters of an earlier, interrupted run of the same episode."""
 
-    def __init__(self, robot: RobotClient, sequences: Sequence[folders.Sequence], views: int, seed: int) -> None:
-        if robot.categories():
-            remedy = "start one with `onelook serve --data-dir NEW_FOLDER`"
-            raise ClientError(f"the service's memory is not empty, so decisions could not be scored; {remedy}")
+    def __init__(
+        self,
+        robot: RobotClient,
+        subjects: Sequence[Subject],
+        conduct: Conduct,
+        *,
+        done: Sequence[Encounter] = (),
+        truth: Truth | None = None,
+        number: int = 0,
+    ) -> None:
+        """`number` tells robots of one memory apart. Raises ClientError where the memory holds what this episode did not teach it."""
         self._robot = robot
-        self._views = views
-        self._order = random.Random(seed)
-        self.sequences = list(sequences)
-        self._order.shuffle(self.sequences)
-        self._founders: dict[str, folders.Sequence] = {}
+        self._conduct = conduct
+        self._truth = truth or Truth()
+        self._number = number
+        self.subjects = list(subjects)
+        self._met = len(done)
+        for each in done:
+            if each.learnt is not None:
+                self._truth.add(each.learnt, each.founder)
 
     def __iter__(self) -> Iterator[Encounter]:
-        return (self._meet(number, sequence) for number, sequence in enumerate(self.sequences, start=1))
+        for number, subject in enumerate(self.subjects, start=1):
+            if number > self._met:
+                yield self.meet(number, subject)
 
-    def _meet(self, number: int, sequence: folders.Sequence) -> Encounter:
-        world = ReplayWorld(sequence)
-        burst = world.glance(self._views, first=self._order.randrange(1 << 16))
+    def meet(self, number: int, subject: Subject) -> Encounter:
+        """One encounter."""
+        chance = random.Random(self._conduct.seed * 100_003 + self._number * 10_007 + number)
+        world = subject.enter()
+        (thing,) = world.objects
+        arm = Arm(world, self._conduct.arm)
+        burst = self._without_lost(arm.glance(self._conduct.views, chance.randrange(1 << 16)), chance)
+        arm.offsets_deg.clear()
+        in_memory = self._truth.has(thing.category)
         started = time.perf_counter()
-        seen = self._robot.observe(burst)
+        seen, burst, looks = self._observe(burst, arm)
         observe_ms = (time.perf_counter() - started) * 1e3
-        founder = self._founders.get(seen.category_id or "")
-        in_memory = any(each.category == sequence.category for each in self._founders.values())
-        verdict = judge(seen, sequence.category, founder, in_memory)
+        founder = self._truth.founder(seen.category_id)
+        verdict = judge(seen.outcome, thing.category, founder, in_memory)
         learnt, scan_ms, failure = None, None, seen.pose_error or seen.scan_error
         if seen.scan is not None:
             started = time.perf_counter()
-            learnt, failure = _carry_out(seen.scan, world)
+            learnt, failure = _carry_out(seen, arm)
             scan_ms = (time.perf_counter() - started) * 1e3
         if learnt is not None:
-            self._founders[learnt.id] = sequence
+            self._truth.add(learnt.id, Founder.of(thing))
+        most_similar = seen.similarities[0] if seen.similarities else None
+        nearest = self._truth.founder(most_similar.category_id) if most_similar else None
         return Encounter(
             number=number,
-            sequence=sequence,
-            burst=burst,
-            observation=seen,
-            in_memory=in_memory,
+            name=thing.name,
+            category=thing.category,
+            observation_id=seen.id,
+            outcome=seen.outcome,
             verdict=verdict,
+            category_id=seen.category_id,
             kind=founder.category if founder else None,
-            error=_error(seen, founder, sequence) if verdict is Verdict.RECOGNISED else None,
-            learnt=learnt,
-            offsets_deg=tuple(world.offsets_deg),
+            nearest_kind=nearest.category if nearest else None,
+            similarity=most_similar.similarity if most_similar else None,
+            threshold=seen.threshold,
+            in_memory=in_memory,
+            has_truth=thing.world_from_model is not None,
+            error=_error(seen, founder, thing) if verdict is Verdict.RECOGNISED else None,
+            learnt=learnt.id if learnt else None,
+            learnt_views=learnt.views if learnt else 0,
+            founder_matrix=thing.world_from_model.as_matrix().tolist() if learnt and thing.world_from_model else None,
+            best_view=best_view(seen),
+            views=len(burst),
+            looks=looks,
+            offsets_deg=tuple(arm.offsets_deg),
+            refused=arm.refused,
             failure=failure,
             observe_ms=observe_ms,
             scan_ms=scan_ms,
+            motion_s=arm.clock_s,
+            timings_ms=dict(seen.timings_ms),
+            robot=self._number,
         )
 
+    def _observe(self, burst: Burst, arm: Arm) -> tuple[Observation, Burst, int]:
+        """What the service says; where it is uncertain the views it asks for are added and it is asked again."""
+        for looks in range(1, MOST_LOOKS + 1):
+            seen = self._robot.observe(burst)
+            wanted = _further(seen)
+            if not wanted or looks == MOST_LOOKS:
+                break
+            more = list(arm.look_around(wanted, arm.world.center_m))
+            if not more:
+                break
+            burst = Burst([*burst.views, *more])
+        return seen, burst, looks
 
-def judge(seen: Observation, category: str, founder: folders.Sequence | None, in_memory: bool) -> Verdict:
-    """What a decision was worth.
-
-    Args:
-        category: the object's true category.
-        founder: the object that founded the category decided for.
-        in_memory: whether an object of the true category had founded one before.
-    """
-    if seen.outcome == "novel":
-        return Verdict.FALSE_NOVEL if in_memory else Verdict.NEW
-    if seen.outcome == "uncertain":
-        return Verdict.UNDECIDED
-    return Verdict.RECOGNISED if founder is not None and founder.category == category else Verdict.FALSE_KNOWN
+    def _without_lost(self, burst: Burst, chance: random.Random) -> Burst:
+        kept = [index for index in range(len(burst)) if chance.random() >= self._conduct.lost_views]
+        return burst.select(kept or [0])
 
 
-def _carry_out(scan: Scan, world: ReplayWorld) -> tuple[Category | None, str | None]:
+def require_own_memory(robot: RobotClient, done: Sequence[Encounter]) -> None:
+    """Raises ClientError where the service's memory holds categories that the encounters so far did not make."""
+    own = {each.learnt for each in done}
+    if {each.id for each in robot.categories()} - own:
+        remedy = "start one with `onelook serve --data-dir NEW_FOLDER`"
+        raise ClientError(f"the service's memory is not empty, so decisions could not be scored; {remedy}")
+
+
+def shuffled(subjects: Sequence[Subject], seed: int) -> list[Subject]:
+    """In an order that depends on the seed alone."""
+    order = list(subjects)
+    random.Random(seed).shuffle(order)
+    return order
+
+
+def _further(seen: Observation) -> list[FloatArray]:
+    """The camera poses, each of shape (4, 4), that would settle an uncertain decision."""
+    asked = seen.raw.get("viewpoints") or {}
+    return [np.array(pose) for pose in asked.get("world_from_camera", ())]
+
+
+def _carry_out(seen: Observation, arm: Arm) -> tuple[Category | None, str | None]:
     """The category made, or why none was."""
+    assert seen.scan is not None
     try:
-        for viewpoint in scan:
-            scan.add(world.capture(viewpoint))
-        return scan.complete(), None
+        return arm.carry_out(seen.scan), None
     except ServiceProblem as problem:
         return None, str(problem)
 
 
-def _error(seen: Observation, founder: folders.Sequence | None, sequence: folders.Sequence) -> PoseError | None:
-    if seen.pose is None or founder is None or founder.world_from_model is None or sequence.world_from_model is None:
+def _error(seen: Observation, founder: Founder | None, thing: WorldObject) -> PoseError | None:
+    if seen.pose is None or founder is None or founder.world_from_model is None or thing.world_from_model is None:
         return None
-    return pose_error(seen.pose.target_from_reference, founder.world_from_model, sequence.world_from_model, sequence.symmetries)
-
-
-@dataclass(frozen=True)
-class Summary:
-    """An episode in figures."""
-
-    objects: int
-    kinds: int
-    """True categories met."""
-    categories: int
-    """Categories in the memory at the end."""
-    met_again: int
-    """Objects whose category was in the memory."""
-    correct_known: int
-    false_novel: int
-    false_known: int
-    undecided: int
-    acc30: float | None
-    """Percentage of rightly recognised objects with ground truth whose rotation is at most 30° off; one without a pose counts as wrong."""
-    median_deg: float | None
-    """Median rotation error of the poses of rightly recognised objects."""
-    observe_ms: float
-    """Median time to an answer."""
-    scan_ms: float | None
-    """Median time from a scan's first view to its category."""
-    total_s: float
-
-
-ACC_DEG = 30.0
-
-
-def summarise(encounters: Sequence[Encounter], total_s: float) -> Summary:
-    """The figures of an episode that met at least one object."""
-    count = {verdict: sum(each.verdict is verdict for each in encounters) for verdict in Verdict}
-    errors = [each.error for each in encounters if each.error is not None]
-    recognised = [each for each in encounters if each.verdict is Verdict.RECOGNISED]
-    scored = [each.error or NO_POSE for each in recognised if each.sequence.world_from_model is not None]
-    scans = [each.scan_ms for each in encounters if each.scan_ms is not None]
-    return Summary(
-        objects=len(encounters),
-        kinds=len({each.sequence.category for each in encounters}),
-        categories=sum(each.learnt is not None for each in encounters),
-        met_again=sum(each.in_memory for each in encounters),
-        correct_known=len(recognised),
-        false_novel=count[Verdict.FALSE_NOVEL],
-        false_known=count[Verdict.FALSE_KNOWN],
-        undecided=count[Verdict.UNDECIDED],
-        acc30=accuracy(scored, ACC_DEG) if scored else None,
-        median_deg=median(errors, "rotation_deg") if errors else None,
-        observe_ms=float(np.median([each.observe_ms for each in encounters])),
-        scan_ms=float(np.median(scans)) if scans else None,
-        total_s=total_s,
-    )
+    return pose_error(seen.pose.target_from_reference, founder.world_from_model, thing.world_from_model, thing.symmetries)

@@ -8,7 +8,9 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from clients.simulator.episode import ACC_DEG, Encounter, Summary, Verdict
+from clients.simulator.encounter import Encounter, Verdict
+from clients.simulator.summary import ACC_DEG, Summary
+from clients.simulator.teacher import Lesson, TeachingSummary
 
 STAGES = {"find": "find", "features": "features", "points": "features", "decide": "decide"}
 """The service's stages, by the column they are added up in; all others are part of the pose."""
@@ -45,13 +47,39 @@ def show(encounters: Iterable[Encounter], total: int, console: Console) -> list[
 
 def summary_table(summary: Summary) -> Table:
     """The figures of an episode."""
-    table = Table(title="Summary", title_justify="left", show_header=False, box=None, pad_edge=False)
+    return _facts("Summary", summary_rows(summary))
+
+
+def _facts(title: str, rows: Sequence[tuple[str, str, str]]) -> Table:
+    table = Table(title=title, title_justify="left", show_header=False, box=None, pad_edge=False)
     table.add_column(style="dim")
     table.add_column(justify="right", style="bold")
     table.add_column(style="dim")
-    for row in summary_rows(summary):
+    for row in rows:
         table.add_row(*row)
     return table
+
+
+def lesson_line(lesson: Lesson) -> Text:
+    """One thing that the teacher did."""
+    if lesson.action == "teach":
+        done = Text(f"taught from {lesson.name}", style="cyan") if lesson.right else Text(f"could not be taught: {lesson.failure}", style="red")
+    else:
+        answer = f"answered {lesson.answer or 'that it does not know'}"
+        done = Text(answer, style="green") if lesson.right else Text(f"{answer}, corrected", style="red")
+    accuracy = "" if lesson.accuracy is None else f"  {100 * lesson.accuracy:.0f} % right lately"
+    return Text.assemble(f"{lesson.number:>4}  {lesson.known:>3} known  {lesson.name:<22} ", done, (accuracy, "dim"))
+
+
+def teaching_table(summary: TeachingSummary) -> Table:
+    """What the protocol reports."""
+    rows = [
+        ("categories learnt", str(summary.categories_learnt), f"of {summary.categories_taught} taught; ended: {summary.ended}"),
+        ("questions asked", str(summary.questions), f"{summary.corrections} of the answers corrected"),
+        ("right answers", f"{summary.accuracy:.0f} %", f"{summary.last_accuracy:.0f} % of the last ones"),
+        ("bursts a category", f"{summary.instances_a_category:.1f}", "in the memory at the end"),
+    ]
+    return _facts("Teaching", rows)
 
 
 def summary_rows(summary: Summary) -> list[tuple[str, str, str]]:
@@ -60,26 +88,33 @@ def summary_rows(summary: Summary) -> list[tuple[str, str, str]]:
         ("objects met", str(summary.objects), f"of {summary.kinds} kinds"),
         ("categories learnt", str(summary.categories), "each from one object"),
         ("correctly recognised", str(summary.correct_known), f"of {summary.met_again} whose category was in the memory"),
-        ("false novel", str(summary.false_novel), "known categories taken for new ones"),
-        ("false known", str(summary.false_known), "taken for a category of another kind"),
+        ("false novel", _share(summary.false_novel, summary.false_novel_rate), f"of {summary.met_again}: known categories taken for new ones"),
+        ("false known", _share(summary.false_known, summary.false_known_rate), f"of {summary.objects}: taken for a category of another kind"),
     ]
     if summary.undecided:
         rows.append(("undecided", str(summary.undecided), "more views were asked for"))
-    if summary.acc30 is not None:
-        rows.append((f"Acc{ACC_DEG:.0f}", f"{summary.acc30:.0f} %", f"of the recognised are at most {ACC_DEG:.0f}° from the truth"))
+    for limit, value in zip(ACC_DEG, (summary.acc30, summary.acc15, summary.acc7_5)):
+        if value is not None:
+            rows.append((f"Acc{limit:g}", f"{value:.0f} %", f"of the recognised are at most {limit:g}° from the truth"))
     if summary.median_deg is not None:
         rows.append(("median rotation error", f"{summary.median_deg:.1f}°", ""))
     rows.append(("time to an answer", f"{summary.observe_ms / 1e3:.1f} s", "median"))
     if summary.scan_ms is not None:
         rows.append(("time to a category", f"{summary.scan_ms / 1e3:.1f} s", "median, from the scan's first view"))
+    if summary.motion_s:
+        rows.append(("arm in motion", f"{summary.motion_s / 60:.1f} min", f"simulated; {summary.refused} viewpoints were out of reach"))
     rows.append(("whole episode", f"{summary.total_s:.0f} s", ""))
     return rows
+
+
+def _share(count: int, rate: float | None) -> str:
+    return str(count) if rate is None else f"{count} ({rate:.0f} %)"
 
 
 def stage_ms(encounter: Encounter) -> dict[str, float]:
     """The service's milliseconds, added up in those of COLUMNS that took place."""
     added: dict[str, float] = {}
-    for stage, milliseconds in encounter.observation.timings_ms.items():
+    for stage, milliseconds in encounter.timings_ms.items():
         if stage != "total":
             column = STAGES.get(stage, "pose")
             added[column] = added.get(column, 0.0) + milliseconds
@@ -89,7 +124,7 @@ def stage_ms(encounter: Encounter) -> dict[str, float]:
 def _row(stages: Sequence[str], encounter: Encounter | None = None, *, header: bool = False) -> Table:
     """A table of one row, or of the headings; all have the same widths."""
     table = Table(box=None, show_header=header, pad_edge=False, padding=(0, 1, 0, 0), header_style="dim")
-    table.add_column("#", justify="right", width=3)
+    table.add_column("#", justify="right", width=4)
     for heading, width in (("object", 22), ("decision", 22)):
         table.add_column(heading, width=width, no_wrap=True)
     table.add_column("similarity", justify="right", width=13)
@@ -103,10 +138,11 @@ def _row(stages: Sequence[str], encounter: Encounter | None = None, *, header: b
 
 
 def _cells(encounter: Encounter, stages: Sequence[str]) -> list[Text | str]:
-    spent = {**stage_ms(encounter), "total": encounter.observation.timings_ms["total"]}
+    spent = {**stage_ms(encounter), "total": encounter.timings_ms["total"]}
     times = [f"{spent[stage]:.0f}" if stage in spent else "" for stage in stages]
     scan = "" if encounter.scan_ms is None else f"{encounter.scan_ms / 1e3:.1f}"
-    return [str(encounter.number), encounter.sequence.name, _decision(encounter), similarity(encounter), _rotation(encounter), *times, scan]
+    number = f"{encounter.robot + 1}.{encounter.number}" if encounter.robot else str(encounter.number)
+    return [number, encounter.name, _decision(encounter), similarity(encounter), _rotation(encounter), *times, scan]
 
 
 def _decision(encounter: Encounter) -> Text:
@@ -122,15 +158,14 @@ def _decision(encounter: Encounter) -> Text:
 
 def similarity(encounter: Encounter) -> str:
     """The best similarity against the threshold."""
-    observation = encounter.observation
-    if not observation.similarities or observation.threshold is None:
+    best, threshold = encounter.similarity, encounter.threshold
+    if best is None or threshold is None:
         return "memory empty"
-    best = observation.similarities[0].similarity
-    return f"{best:.3f} {'>' if best > observation.threshold else '≤'} {observation.threshold:.3f}"
+    return f"{best:.3f} {'>' if best > threshold else '≤'} {threshold:.3f}"
 
 
 def _rotation(encounter: Encounter) -> Text:
     if encounter.error is None:
         return Text("")
     degrees = encounter.error.rotation_deg
-    return Text(f"{degrees:.1f}°", style="green" if degrees <= ACC_DEG else "bold red")
+    return Text(f"{degrees:.1f}°", style="green" if degrees <= ACC_DEG[0] else "bold red")

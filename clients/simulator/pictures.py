@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from clients.errors import NotFoundProblem
 from clients.robot import RobotClient
-from clients.simulator.episode import Encounter
+from clients.simulator.encounter import Encounter
 
 JPEG_QUALITY = 82
 THUMBNAIL_SIDE = 128
@@ -40,11 +40,11 @@ class Pictures:
 
 def fetch_pictures(robot: RobotClient, encounter: Encounter) -> Pictures:
     """All pictures that the service has of an encounter."""
-    view = shown_view(encounter)
+    view = encounter.best_view
 
     def fetch(name: str, side: int | None = None, **which: int) -> str | None:
         try:
-            return data_uri(robot.picture(f"/v1/observations/{encounter.observation.id}/{name}.png", **which), side)
+            return data_uri(robot.picture(f"/v1/observations/{encounter.observation_id}/{name}.png", **which), side)
         except NotFoundProblem:
             return None
 
@@ -59,12 +59,6 @@ def fetch_pictures(robot: RobotClient, encounter: Encounter) -> Pictures:
     )
 
 
-def shown_view(encounter: Encounter) -> int:
-    """The view in which most correspondences agree with the pose; the first where there is no pose."""
-    pose = encounter.observation.pose
-    return 0 if pose is None else pose.best_view
-
-
 def data_uri(png: bytes, side: int | None = None) -> str:
     """A PNG as an inline JPEG, reduced to at most `side` pixels high."""
     image = _decode(png)
@@ -76,8 +70,8 @@ def data_uri(png: bytes, side: int | None = None) -> str:
 def _scanned(robot: RobotClient, encounter: Encounter) -> str | None:
     if encounter.learnt is None:
         return None
-    folder = f"/v1/categories/{encounter.learnt.id}/views"
-    pictures = [robot.picture(f"{folder}/{view}/rgb.png") for view in range(encounter.learnt.views)]
+    folder = f"/v1/categories/{encounter.learnt}/views"
+    pictures = [robot.picture(f"{folder}/{view}/rgb.png") for view in range(encounter.learnt_views)]
     thumbnails = [_resized(_decode(picture), THUMBNAIL_SIDE) for picture in pictures]
     missing = -len(thumbnails) % THUMBNAIL_COLUMNS
     thumbnails += [np.zeros_like(thumbnails[0])] * missing

@@ -1,4 +1,4 @@
-"""A self-contained page that shows an episode: figures, decisions, and the pictures of every encounter."""
+"""A self-contained page that shows an episode: figures, decisions, charts, and the pictures of what went worst."""
 
 from __future__ import annotations
 
@@ -6,17 +6,21 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from clients.answers import Category, Info
-from clients.simulator.episode import ACC_DEG, Encounter, Summary, Verdict
+from clients.simulator import charts
+from clients.simulator.encounter import Encounter, Verdict
 from clients.simulator.live import similarity, stage_ms, summary_rows
 from clients.simulator.pictures import Pictures
+from clients.simulator.summary import ACC_DEG, Summary
 from clients.simulator.timeline import Timeline
 
 TEMPLATE = "report.html"
+ALL_SHOWN = 24
+"""Episodes up to this long show the pictures of every encounter; longer ones those of the WORST."""
+WORST = 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,8 +29,8 @@ class EpisodeRecord:
 
     summary: Summary
     encounters: Sequence[Encounter]
-    pictures: Sequence[Pictures]
-    """One for each encounter."""
+    pictures: Mapping[int, Pictures]
+    """By index in `encounters`: of those that are shown, see `shown`."""
     categories: Sequence[Category]
     """The memory at the end."""
     info: Info
@@ -38,12 +42,17 @@ class EpisodeRecord:
 class LearntCategory:
     """One row of the table of categories."""
 
-    number: int
     founder: Encounter
-    founder_pictures: Pictures
+    founder_pictures: Pictures | None
     category: Category
     recognised: Sequence[Encounter]
     """Later encounters that were taken for it."""
+
+
+def shown(encounters: Sequence[Encounter]) -> list[int]:
+    """Indices of the encounters whose pictures are shown, in the order of showing."""
+    chosen = encounters if len(encounters) <= ALL_SHOWN else charts.worst(encounters, WORST)
+    return [list(encounters).index(each) for each in chosen]
 
 
 def write_report(record: EpisodeRecord, path: Path) -> None:
@@ -53,11 +62,16 @@ def write_report(record: EpisodeRecord, path: Path) -> None:
     page = environment.get_template(TEMPLATE).render(
         record=record,
         rows=summary_rows(record.summary),
-        encounters=list(zip(record.encounters, record.pictures, strict=True)),
+        gallery=[(record.encounters[index], record.pictures[index]) for index in shown(record.encounters)],
+        all_shown=len(record.encounters) <= ALL_SHOWN,
         learnt=learnt_categories(record),
         timeline=Timeline(record.encounters),
+        confusion=charts.Confusion.of(record.encounters),
+        curve=charts.curve(record.encounters),
+        histogram=charts.pose_histogram(record.encounters),
+        stages=charts.stage_bars(record.encounters),
         Verdict=Verdict,
-        acc_deg=ACC_DEG,
+        acc_deg=ACC_DEG[0],
         similarity=similarity,
         stage_ms=stage_ms,
     )
@@ -66,43 +80,20 @@ def write_report(record: EpisodeRecord, path: Path) -> None:
 
 
 def learnt_categories(record: EpisodeRecord) -> list[LearntCategory]:
-    """The categories in the order they were learnt, as they are at the end."""
+    """The categories in the order they were learnt, as they are at the end; those that are gone since are left out."""
     at_end = {category.id: category for category in record.categories}
-    founders = [(each, pictures) for each, pictures in zip(record.encounters, record.pictures, strict=True) if each.learnt is not None]
     learnt = []
-    for number, (founder, pictures) in enumerate(founders, start=1):
-        assert founder.learnt is not None
-        category = at_end.get(founder.learnt.id, founder.learnt)
-        recognised = [each for each in record.encounters if each.observation.category_id == category.id]
-        learnt.append(LearntCategory(number, founder, pictures, category, recognised))
+    for index, founder in enumerate(record.encounters):
+        category = at_end.get(founder.learnt or "")
+        if category is not None:
+            recognised = [each for each in record.encounters if each.category_id == category.id]
+            learnt.append(LearntCategory(founder, record.pictures.get(index), category, recognised))
     return learnt
 
 
 def write_json(record: EpisodeRecord, path: Path) -> None:
     """Writes the figures and one row an encounter, for programs."""
     meta = {**record.settings, "service": asdict(record.info)}
-    rows = [_row(encounter) for encounter in record.encounters]
-    path.write_text(json.dumps({"meta": meta, "summary": asdict(record.summary), "rows": rows}, indent=1), encoding="utf-8")
-
-
-def _row(encounter: Encounter) -> dict[str, Any]:
-    seen = encounter.observation
-    return {
-        "number": encounter.number,
-        "object": encounter.sequence.name,
-        "category": encounter.sequence.category,
-        "observation_id": seen.id,
-        "outcome": seen.outcome,
-        "verdict": encounter.verdict.value,
-        "recognised_as": encounter.kind,
-        "category_id": encounter.learnt.id if encounter.learnt else seen.category_id,
-        "similarity": seen.similarities[0].similarity if seen.similarities else None,
-        "threshold": seen.threshold,
-        "rotation_error_deg": encounter.error.rotation_deg if encounter.error else None,
-        "translation_error": encounter.error.translation if encounter.error else None,
-        "log_scale_error": encounter.error.log_scale if encounter.error else None,
-        "failure": encounter.failure,
-        "observe_ms": encounter.observe_ms,
-        "scan_ms": encounter.scan_ms,
-        "timings_ms": dict(seen.timings_ms),
-    }
+    rows = [json.loads(encounter.as_json()) for encounter in record.encounters]
+    rates = {"false_novel_rate": record.summary.false_novel_rate, "false_known_rate": record.summary.false_known_rate}
+    path.write_text(json.dumps({"meta": meta, "summary": {**asdict(record.summary), **rates}, "rows": rows}, indent=1), encoding="utf-8")

@@ -8,7 +8,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from clients.simulator.episode import ACC_DEG, Encounter
+from clients.simulator.encounter import Encounter
+from clients.simulator.summary import ACC_DEG
 
 WIDTH = 1120
 LEFT = 56
@@ -16,7 +17,7 @@ SIMILARITY_TOP, SIMILARITY_HEIGHT = 16, 150
 ERROR_TOP, ERROR_HEIGHT = 214, 96
 LABELLED = 16
 """Columns up to this many have room for the objects' kinds."""
-ERROR_TOP_DEG = 2 * ACC_DEG
+ERROR_TOP_DEG = 2 * ACC_DEG[0]
 """Height of the error's panel; a pose farther off than this is wrong however far, and its bar ends at the top."""
 
 
@@ -50,8 +51,8 @@ class Timeline:
     def __init__(self, encounters: Sequence[Encounter]) -> None:
         self.encounters = encounters
         self._step = (WIDTH - LEFT) / max(1, len(encounters))
-        asked = [(each, each.observation.similarities[0].similarity) for each in encounters if each.observation.similarities]
-        thresholds = [each.observation.threshold for each in encounters if each.observation.threshold is not None]
+        asked = [(each, each.similarity) for each in encounters if each.similarity is not None]
+        thresholds = [each.threshold for each in encounters if each.threshold is not None]
         values = [value for _, value in asked] + thresholds or [0.0, 1.0]
         margin = 0.08 * (max(values) - min(values)) or 0.1
         self._low, self._high = min(values) - margin, max(values) + margin
@@ -59,7 +60,7 @@ class Timeline:
         self.threshold = Tick(self._similarity_y(thresholds[0]), f"{thresholds[0]:.2f}") if thresholds else None
         posed = [(each, each.error.rotation_deg) for each in encounters if each.error is not None]
         self.errors = [Mark(each, self.x(each), self._error_y(degrees), degrees) for each, degrees in posed]
-        self.acc = Tick(self._error_y(ACC_DEG), f"{ACC_DEG:.0f}°")
+        self.acc = Tick(self._error_y(ACC_DEG[0]), f"{ACC_DEG[0]:.0f}°")
         self.zero = Tick(self._error_y(0.0), "0°")
 
     @property

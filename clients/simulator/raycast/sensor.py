@@ -71,10 +71,10 @@ IDEAL = SensorConfig(
 class Sensor:
     """One camera: its calibration error is its own."""
 
-    def __init__(self, config: SensorConfig, rng: Generator) -> None:
+    def __init__(self, config: SensorConfig, calibration: Generator, noise: Generator) -> None:
         self.config = config
-        self._rng = rng
-        self._hand_eye = _small_motion(rng, config.hand_eye_deg, config.hand_eye_m)
+        self._rng = noise
+        self._hand_eye = _small_motion(calibration, config.hand_eye_deg, config.hand_eye_m)
 
     def look(self, scene: LitScene, world_from_camera: FloatArray, *, mask_of: int | None = None) -> View:
         """The view from where the robot believes its camera to be, which is what the view's camera says.

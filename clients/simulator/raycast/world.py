@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
 from clients.simulator.raycast.mesh import rotation_about
 from clients.simulator.raycast.model import Model
 from clients.simulator.raycast.render import LitScene
-from clients.simulator.raycast.room import make_room
+from clients.simulator.raycast.room import Room, make_room
 from clients.simulator.raycast.sensor import Sensor, SensorConfig
 from clients.simulator.world import WorldObject
 from core.scan import hemisphere
@@ -32,11 +33,11 @@ class RaycastWorld:
     Letters: V views.
     """
 
-    def __init__(self, seed: int, sensor: SensorConfig | None = None) -> None:
-        """`seed` decides room, lamps, the camera's errors, and where objects are put."""
-        self._room = make_room(np.random.default_rng([seed, 0]))
-        self._sensor = Sensor(sensor or SensorConfig(), np.random.default_rng([seed, 1]))
-        self._placing = np.random.default_rng([seed, 2])
+    def __init__(self, seed: int, sensor: SensorConfig | None = None, *, visit: int = 0) -> None:
+        """`seed` decides room, lamps and the camera's calibration; with `visit`, its noise and where objects are put."""
+        self._room = _room(seed)
+        self._sensor = Sensor(sensor or SensorConfig(), np.random.default_rng([seed, 1]), np.random.default_rng([seed, 2, visit]))
+        self._placing = np.random.default_rng([seed, 3, visit])
         self._models: list[Model] = []
         self._poses: list[Sim3] = []
         self._scene: LitScene | None = None
@@ -92,6 +93,11 @@ class RaycastWorld:
         return self._scene
 
 
+@lru_cache(maxsize=8)
+def _room(seed: int) -> Room:
+    return make_room(np.random.default_rng([seed, 0]))
+
+
 def standing(model: Model, rotation: FloatArray, place_m: tuple[float, float]) -> Sim3:
     """world_from_model of a model turned by `rotation`, shape (3, 3), that stands on the table, its box's middle above (x, y)."""
     lowest = float((model.mesh.vertices @ rotation.T)[:, 2].min()) * model.size_m
@@ -100,10 +106,14 @@ def standing(model: Model, rotation: FloatArray, place_m: tuple[float, float]) -
 
 @dataclass(frozen=True, eq=False)
 class RaycastSubject:
-    """An object to be put on a world's table."""
+    """An object to be put on the table of a world, the same one for all objects of a seed."""
 
-    world: RaycastWorld
     model: Model
+    seed: int
+    """Of the world."""
+    visit: int
+    """Of this object; see `RaycastWorld`."""
+    sensor: SensorConfig | None = None
 
     @property
     def category(self) -> str:
@@ -117,5 +127,6 @@ class RaycastSubject:
 
     def enter(self) -> RaycastWorld:
         """The world, with only this object on the table."""
-        self.world.show([self.model])
-        return self.world
+        world = RaycastWorld(self.seed, self.sensor, visit=self.visit)
+        world.show([self.model])
+        return world

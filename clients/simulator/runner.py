@@ -1,0 +1,118 @@
+"""Runs a script against a service: shows, keeps and reports every encounter."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from rich.console import Console
+
+from clients.errors import ClientError
+from clients.robot import RobotClient
+from clients.simulator import live
+from clients.simulator.encounter import Encounter
+from clients.simulator.episode import Episode, Truth, require_own_memory
+from clients.simulator.fleet import disagreements, together
+from clients.simulator.pictures import fetch_pictures
+from clients.simulator.report import EpisodeRecord, shown, write_json, write_report
+from clients.simulator.script import Script
+from clients.simulator.summary import Summary, summarise
+from clients.simulator.teacher import Lessons, TeachingSummary
+from clients.simulator.world import Subject
+
+
+@dataclass(frozen=True)
+class Output:
+    """Where a run keeps what."""
+
+    folder: Path
+
+    @property
+    def lines(self) -> Path:
+        """One JSON line an encounter, written as it happens."""
+        return self.folder / "episode.jsonl"
+
+    @property
+    def lessons(self) -> Path:
+        """One JSON line a lesson of the teacher's."""
+        return self.folder / "lessons.jsonl"
+
+    def earlier(self, script: Script) -> list[Encounter]:
+        """The encounters of an interrupted run. Raises ClientError where there was none, or it was of another script."""
+        if not self.lines.is_file():
+            raise ClientError(f"there is no run to resume in {self.folder}; leave out --resume")
+        settings, *rest = self.lines.read_text(encoding="utf-8").splitlines()
+        if json.loads(settings) != json.loads(json.dumps(script.as_settings())):
+            raise ClientError(f"the run in {self.folder} was of {settings}; resume it with the same settings, or name another --out")
+        return [Encounter.from_json(line) for line in rest if line.endswith("}")]
+
+
+def run_episode(script: Script, url: str, output: Output, console: Console, *, resume: bool = False) -> Summary:
+    """All encounters, the report and the JSON; returns the figures. Raises ClientError where the memory is not this episode's."""
+    done = output.earlier(script) if resume else []
+    started = time.perf_counter()
+    with ExitStack() as clients:
+        robots = [clients.enter_context(RobotClient(url)) for _ in range(script.robots)]
+        require_own_memory(robots[0], done)
+        truth = Truth()
+        conduct = script.conduct()
+        episodes = []
+        for number, robot in enumerate(robots):
+            own = [each for each in done if each.robot == number]
+            episodes.append(Episode(robot, script.subjects(number), conduct, done=own, truth=truth, number=number))
+        total = sum(len(each.subjects) for each in episodes)
+        live_ones = _kept(together(episodes) if len(episodes) > 1 else iter(episodes[0]), output.lines, script, done)
+        encounters = [*done, *live.show(live_ones, total - len(done), console)]
+        summary = summarise(encounters, time.perf_counter() - started)
+        with console.status("drawing the report"):
+            record = _record(robots[0], script, encounters, summary)
+        wrong = disagreements(robots[0], encounters)
+    write_report(record, output.folder / "report.html")
+    write_json(record, output.folder / "episode.json")
+    console.print(live.summary_table(summary))
+    if script.robots > 1:
+        console.print(f"memory: {'; '.join(wrong) if wrong else f'right after {script.robots} robots'}", style="red" if wrong else "green")
+    console.print(f"\nreport: {output.folder / 'report.html'}")
+    return summary
+
+
+def run_lessons(script: Script, url: str, output: Output, console: Console) -> TeachingSummary:
+    """All that the teacher does; returns what the protocol reports."""
+    groups: dict[str, list[Subject]] = {}
+    for subject in script.subjects():
+        groups.setdefault(subject.category, []).append(subject)
+    with RobotClient(url) as robot:
+        require_own_memory(robot, [])
+        lessons = Lessons(robot, lambda category, index: groups[category][index], sorted(groups), script.conduct())
+        with output.lessons.open("w", encoding="utf-8") as file:
+            for lesson in lessons:
+                file.write(json.dumps(asdict(lesson)) + "\n")
+                file.flush()
+                console.print(live.lesson_line(lesson), highlight=False)
+        summary = lessons.summary
+    console.print(live.teaching_table(summary))
+    (output.folder / "teaching.json").write_text(json.dumps({"meta": script.as_settings(), "summary": asdict(summary)}, indent=1))
+    return summary
+
+
+def _kept(encounters: Iterator[Encounter], file: Path, script: Script, done: Sequence[Encounter]) -> Iterator[Encounter]:
+    """The same encounters, each written down before the next one begins."""
+    with file.open("w", encoding="utf-8") as stream:
+        stream.write(json.dumps(script.as_settings()) + "\n")
+        stream.writelines(each.as_json() + "\n" for each in done)
+        stream.flush()
+        for encounter in encounters:
+            stream.write(encounter.as_json() + "\n")
+            stream.flush()
+            yield encounter
+
+
+def _record(robot: RobotClient, script: Script, encounters: Sequence[Encounter], summary: Summary) -> EpisodeRecord:
+    pictures = {index: fetch_pictures(robot, encounters[index]) for index in shown(encounters)}
+    return EpisodeRecord(summary, encounters, pictures, robot.categories(), robot.info(), script.as_settings())
+
+

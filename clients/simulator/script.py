@@ -1,0 +1,178 @@
+"""An episode as a small YAML file says it."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Mapping, Sequence
+from dataclasses import MISSING, asdict, dataclass, field, fields, replace
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from clients.datasets.folders import by_category
+from clients.datasets.samples import data_or_samples
+from clients.datasets.sources import find_sequences
+from clients.simulator.arm import FREE, ArmConfig
+from clients.simulator.episode import Conduct, shuffled
+from clients.simulator.replay import ReplaySubject
+from clients.simulator.world import Subject
+from core.errors import InvalidInput
+
+WORLDS = ("raycast", "replay")
+ORDERS = ("random", "grouped")
+ROBOT_SEEDS = 1_000
+"""Between the seeds of robots that share a memory."""
+
+
+@dataclass(frozen=True)
+class Faults:
+    """What goes wrong on purpose."""
+
+    lost_views: float = 0.0
+    """Share of views that never arrive."""
+    sensor: Mapping[str, float] = field(default_factory=dict)
+    """Settings of the rendered world's camera, such as `disparity_noise_px: 0.3`."""
+
+
+@dataclass(frozen=True)
+class Script:
+    """See module; every field may be left out."""
+
+    world: str = "raycast"
+    """`raycast` renders, `replay` plays recordings."""
+    data: str | None = None
+    """Recordings for `replay`; the samples of the repository where left out."""
+    meshes: str | None = None
+    """Meshes of a user's own for `raycast`, in place of the simulator's categories."""
+    categories: tuple[str, ...] = ()
+    """Which to draw objects from; five drawn by the seed where left out."""
+    instances: int = 3
+    """Objects of each category."""
+    length: int | None = None
+    """Objects met; some repeatedly where there are fewer. Each once where left out."""
+    order: str = "random"
+    """`random`, or `grouped`: one category after the other."""
+    views: int = 8
+    """In the burst of each encounter."""
+    seed: int = 0
+    robots: int = 1
+    """That share the memory, each in a world of its own."""
+    teacher: bool = False
+    """Whether a teacher teaches, asks and corrects, in place of the robot's own discovery."""
+    faults: Faults = Faults()
+
+    def conduct(self) -> Conduct:
+        """How robots go about it: on an arm in the rendered world, anywhere in a recording."""
+        arm = ArmConfig() if self.world == "raycast" else FREE
+        return Conduct(self.views, self.seed, arm, self.faults.lost_views)
+
+    def subjects(self, robot: int = 0) -> list[Subject]:
+        """What a robot meets, in order."""
+        pool = self._raycast(robot) if self.world == "raycast" else self._replay()
+        drawn = pool if self.order == "grouped" else shuffled(pool, self.seed + ROBOT_SEEDS * robot)
+        if self.length is None:
+            return drawn
+        more = random.Random(self.seed + ROBOT_SEEDS * robot)
+        return [*drawn, *(more.choice(drawn) for _ in range(self.length - len(drawn)))][: self.length]
+
+    def as_settings(self) -> dict[str, object]:
+        """What differs from the defaults, and the world, the seed and the views."""
+        plain = asdict(self)
+        default = asdict(Script())
+        kept = {name: value for name, value in plain.items() if name in {"world", "seed", "views"} or value != default[name]}
+        return {name: Path(str(value)).name if name in {"data", "meshes"} else value for name, value in kept.items()}
+
+    def _raycast(self, robot: int) -> list[Subject]:
+        from clients.simulator.raycast.categories import RECIPES
+        from clients.simulator.raycast.export import draw_models
+        from clients.simulator.raycast.sensor import SensorConfig
+        from clients.simulator.raycast.user_meshes import find_models
+        from clients.simulator.raycast.world import RaycastSubject
+
+        for name in self.faults.sensor:
+            if name not in {each.name for each in fields(SensorConfig)}:
+                raise InvalidInput(f"faults.sensor.{name}", f"is none of {', '.join(each.name for each in fields(SensorConfig))}")
+        sensor: SensorConfig = replace(SensorConfig(), **self.faults.sensor)  # type: ignore[arg-type]  # one type a setting
+        if self.meshes is not None:
+            models = find_models(Path(self.meshes))
+        else:
+            chosen = self.categories or sorted(random.Random(self.seed).sample(sorted(RECIPES), DRAWN_CATEGORIES))
+            models = draw_models(chosen, self.instances, self.seed + ROBOT_SEEDS * robot)
+        seed = self.seed + ROBOT_SEEDS * robot
+        return [RaycastSubject(model, seed, visit, sensor) for visit, model in enumerate(models)]
+
+    def _replay(self) -> list[Subject]:
+        groups = by_category(find_sequences(str(data_or_samples(Path(self.data) if self.data else None))))
+        unknown = set(self.categories) - set(groups)
+        if unknown:
+            raise InvalidInput("categories", f"{', '.join(sorted(unknown))}: not in the recordings, which have {', '.join(groups)}")
+        chosen = self.categories or tuple(groups)
+        return [ReplaySubject(sequence) for category in chosen for sequence in groups[category][: self.instances]]
+
+
+DRAWN_CATEGORIES = 5
+
+
+def read_script(file: Path) -> Script:
+    """A script from a YAML file. Raises InvalidInput naming the field that is wrong."""
+    if not file.is_file():
+        raise InvalidInput("script", f"there is no file {file}")
+    try:
+        content = yaml.safe_load(file.read_text(encoding="utf-8"))
+    except yaml.YAMLError as error:
+        raise InvalidInput("script", f"{file} is not YAML: {error}") from None
+    return script_from(content or {})
+
+
+def script_from(content: Any) -> Script:
+    """A script from what YAML holds. Raises InvalidInput naming the field that is wrong."""
+    given = _checked(Script, content, "")
+    if "faults" in given:
+        given["faults"] = Faults(**_checked(Faults, given["faults"], "faults."))
+    if "categories" in given:
+        given["categories"] = tuple(given["categories"])
+    script = Script(**given)
+    for name, value, allowed in (("world", script.world, WORLDS), ("order", script.order, ORDERS)):
+        if value not in allowed:
+            raise InvalidInput(name, f"{value!r} is none of {', '.join(allowed)}")
+    for name in ("instances", "views", "robots", "length"):
+        number = getattr(script, name)
+        if number is not None and number < 1:
+            raise InvalidInput(name, f"expected 1 or more, found {number}")
+    if not 0 <= script.faults.lost_views < 1:
+        raise InvalidInput("faults.lost_views", f"expected a share from 0 to below 1, found {script.faults.lost_views}")
+    if script.world != "raycast" and (script.meshes or script.faults.sensor):
+        raise InvalidInput("meshes" if script.meshes else "faults.sensor", "is for the world `raycast`: recordings are as they are")
+    return script
+
+
+def _checked(kind: type, content: Any, prefix: str) -> dict[str, Any]:
+    """The fields that a file gives, each of the type of its default."""
+    if not isinstance(content, Mapping):
+        raise InvalidInput(prefix.rstrip(".") or "script", f"expected names and values, found {content!r:.60}")
+    known = {each.name: each for each in fields(kind)}
+    for name, value in content.items():
+        if name not in known:
+            raise InvalidInput(f"{prefix}{name}", f"is none of {', '.join(known)}")
+        default = known[name].default
+        expected = _expected(default if default is not MISSING else {})
+        if not isinstance(value, expected) or isinstance(value, bool) != (expected is bool):
+            raise InvalidInput(f"{prefix}{name}", f"expected {_words(expected)}, found {value!r:.60}")
+    return dict(content)
+
+
+def _expected(default: object) -> Any:
+    if default is None:
+        return (str, int)
+    if isinstance(default, bool):
+        return bool
+    if isinstance(default, tuple):
+        return Sequence
+    if isinstance(default, (Mapping, Faults)):
+        return Mapping
+    return (int, float) if isinstance(default, float) else type(default)
+
+
+def _words(expected: Any) -> str:
+    return " or ".join(each.__name__ for each in (expected if isinstance(expected, tuple) else (expected,)))
