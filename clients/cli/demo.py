@@ -1,79 +1,85 @@
-"""`onelook simulate`, the demo."""
+"""`onelook simulate`: episodes and the demo, driven by a simulated robot."""
 
 from __future__ import annotations
 
-import tempfile
-import time
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import asdict, replace
 from enum import Enum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
-from clients.cli.terminal import console
+from clients.cli.terminal import Json, console, errors, print_json
 
 
 class WorldKind(str, Enum):
     """Where the simulated robot looks."""
 
+    raycast = "raycast"
     replay = "replay"
 
 
+Out = Annotated[Path, typer.Option(help="Folder for the report, the JSON and the memory of the run.")]
+ServiceUrl = Annotated[str | None, typer.Option(help="A service with an empty memory; one is started and stopped where left out.")]
+
+
 def simulate(
-    data: Annotated[Path | None, typer.Option(help="Folder of recorded objects; the samples of the repository where left out.")] = None,
-    out: Annotated[Path, typer.Option(help="Folder for report.html and episode.json.")] = Path("out/demo"),
-    seed: Annotated[int, typer.Option(help="Of the order of the objects and of the views of each.")] = 0,
-    views: Annotated[int, typer.Option(min=2, help="Views in the burst of each encounter.")] = 8,
-    world: Annotated[WorldKind, typer.Option(help="What the robot looks at: recorded views.")] = WorldKind.replay,
-    url: Annotated[str | None, typer.Option(help="A service with an empty memory; one is started and stopped where left out.")] = None,
+    script: Annotated[Path | None, typer.Argument(help="YAML file that says what happens; the demo where left out.")] = None,
+    out: Out = Path("out/demo"),
+    world: Annotated[WorldKind | None, typer.Option(help="Rendered, or recorded views; raycast where left out.")] = None,
+    data: Annotated[str | None, typer.Option(help="Recordings for replay; the samples of the repository where left out.")] = None,
+    seed: Annotated[int | None, typer.Option(help="Of worlds, objects, their order and the views of each; 0 where left out.")] = None,
+    views: Annotated[int | None, typer.Option(min=2, help="Views in the burst of each encounter; 8 where left out.")] = None,
+    robots: Annotated[int | None, typer.Option(min=1, help="Robots that share the memory, each in a world of its own.")] = None,
+    resume: Annotated[bool, typer.Option(help="Continue the interrupted run in --out.")] = False,
+    url: ServiceUrl = None,
+    json: Json = False,
 ) -> None:
     """Drive a service with a simulated robot: meet objects, learn the novel, recognise the known, report.
 
     \f
-    `world` has one kind so far; it is named so that scripts keep working when there are more.
+    Options that are given win over what the script says.
     """
-    from clients.datasets.samples import data_or_samples
-    from clients.datasets.sources import find_sequences
-    from clients.robot import RobotClient
-    from clients.simulator.episode import Episode, summarise
-    from clients.simulator.live import show, summary_table
-    from clients.simulator.pictures import fetch_pictures
-    from clients.simulator.report import EpisodeRecord, write_json, write_report
+    from clients.simulator.runner import Output, run_episode, run_lessons
+    from clients.simulator.script import Script, check, read_script
 
-    data = data_or_samples(data)
-    sequences = find_sequences(data)
+    given: dict[str, Any] = {"world": world.value if world else None, "data": data, "seed": seed, "views": views, "robots": robots}
+    base = read_script(script) if script else Script()
+    if data is not None and world is None:
+        given["world"] = WorldKind.replay.value
+    plan = check(replace(base, **{name: value for name, value in given.items() if value is not None}))
+    output = Output(out)
     out.mkdir(parents=True, exist_ok=True)
-    with _service(url, out / "service.log") as address, RobotClient(address) as robot:
-        started = time.perf_counter()
-        episode = Episode(robot, sequences, views, seed)
-        encounters = show(episode, len(episode.sequences), console)
-        summary = summarise(encounters, time.perf_counter() - started)
-        with console.status("drawing the report"):
-            pictures = [fetch_pictures(robot, encounter) for encounter in encounters]
-        settings = {"world": world.value, "data": data.name, "seed": seed, "views": views}
-        record = EpisodeRecord(summary, encounters, pictures, robot.categories(), robot.info(), settings)
-    write_report(record, out / "report.html")
-    write_json(record, out / "episode.json")
-    console.print(summary_table(summary))
-    console.print(f"\nreport: {out / 'report.html'}")
+    if resume:
+        output.earlier(plan)
+    screen = errors if json else console
+    with service(url, out, fresh=not resume) as address:
+        summary: Any = (
+            run_lessons(plan, address, output, screen) if plan.teacher else run_episode(plan, address, output, screen, resume=resume)
+        )
+    if json:
+        print_json(asdict(summary))
 
 
 @contextmanager
-def _service(url: str | None, log: Path) -> Iterator[str]:
-    """The address of the service named, or of one started for the time being."""
+def service(url: str | None, out: Path, *, fresh: bool = True) -> Iterator[str]:
+    """The address of the service named, or of one started for the time being, whose memory stays in `out`."""
     if url is not None:
         yield url
         return
     from clients.simulator.local_service import local_service
     from core.backbones.weights import embedded_weights
 
-    with console.status("looking for the backbone's weights"):
-        embedded_weights(report=console.print)
-    with tempfile.TemporaryDirectory(prefix="onelook-") as memory:
-        status = console.status("starting the service")
-        status.start()
-        with local_service(Path(memory), log) as address:
-            status.stop()
-            yield address
+    with errors.status("looking for the backbone's weights"):
+        embedded_weights(report=errors.print)
+    memory = out / "memory"
+    if fresh and memory.exists():
+        shutil.rmtree(memory)
+    status = errors.status("starting the service")
+    status.start()
+    with local_service(memory, out / "service.log") as address:
+        status.stop()
+        yield address

@@ -93,7 +93,7 @@ class Arm:
         return None
 
     def nearest(self, world_from_camera: FloatArray, center_m: FloatArray) -> FloatArray | None:
-        """The pose asked for, or where it is out of reach the one nearest to it, about the object, that is not; None where there is none."""
+        """The pose asked for, or where it is out of reach the nearest one about the object that is not; None where there is none."""
         if self.cannot_reach(world_from_camera) is None:
             return world_from_camera
         others = [pose for pose in _others(world_from_camera, center_m) if self.cannot_reach(pose) is None]

@@ -63,7 +63,11 @@ def _facts(title: str, rows: Sequence[tuple[str, str, str]]) -> Table:
 def lesson_line(lesson: Lesson) -> Text:
     """One thing that the teacher did."""
     if lesson.action == "teach":
-        done = Text(f"taught from {lesson.name}", style="cyan") if lesson.right else Text(f"could not be taught: {lesson.failure}", style="red")
+        done = (
+            Text(f"taught from {lesson.name}", style="cyan")
+            if lesson.right
+            else Text(f"could not be taught: {lesson.failure}", style="red")
+        )
     else:
         answer = f"answered {lesson.answer or 'that it does not know'}"
         done = Text(answer, style="green") if lesson.right else Text(f"{answer}, corrected", style="red")
@@ -88,8 +92,16 @@ def summary_rows(summary: Summary) -> list[tuple[str, str, str]]:
         ("objects met", str(summary.objects), f"of {summary.kinds} kinds"),
         ("categories learnt", str(summary.categories), "each from one object"),
         ("correctly recognised", str(summary.correct_known), f"of {summary.met_again} whose category was in the memory"),
-        ("false novel", _share(summary.false_novel, summary.false_novel_rate), f"of {summary.met_again}: known categories taken for new ones"),
-        ("false known", _share(summary.false_known, summary.false_known_rate), f"of {summary.objects}: taken for a category of another kind"),
+        (
+            "false novel",
+            _share(summary.false_novel, summary.false_novel_rate),
+            f"of {summary.met_again}: known categories taken for new ones",
+        ),
+        (
+            "false known",
+            _share(summary.false_known, summary.false_known_rate),
+            f"of {summary.objects}: taken for a category of another kind",
+        ),
     ]
     if summary.undecided:
         rows.append(("undecided", str(summary.undecided), "more views were asked for"))

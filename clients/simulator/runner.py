@@ -114,5 +114,3 @@ def _kept(encounters: Iterator[Encounter], file: Path, script: Script, done: Seq
 def _record(robot: RobotClient, script: Script, encounters: Sequence[Encounter], summary: Summary) -> EpisodeRecord:
     pictures = {index: fetch_pictures(robot, encounters[index]) for index in shown(encounters)}
     return EpisodeRecord(summary, encounters, pictures, robot.categories(), robot.info(), script.as_settings())
-
-

@@ -132,7 +132,11 @@ def script_from(content: Any) -> Script:
         given["faults"] = Faults(**_checked(Faults, given["faults"], "faults."))
     if "categories" in given:
         given["categories"] = tuple(given["categories"])
-    script = Script(**given)
+    return check(Script(**given))
+
+
+def check(script: Script) -> Script:
+    """The script itself. Raises InvalidInput naming the field that is wrong."""
     for name, value, allowed in (("world", script.world, WORLDS), ("order", script.order, ORDERS)):
         if value not in allowed:
             raise InvalidInput(name, f"{value!r} is none of {', '.join(allowed)}")
@@ -144,6 +148,8 @@ def script_from(content: Any) -> Script:
         raise InvalidInput("faults.lost_views", f"expected a share from 0 to below 1, found {script.faults.lost_views}")
     if script.world != "raycast" and (script.meshes or script.faults.sensor):
         raise InvalidInput("meshes" if script.meshes else "faults.sensor", "is for the world `raycast`: recordings are as they are")
+    if script.world != "replay" and script.data:
+        raise InvalidInput("data", "is for the world `replay`: name the world, or leave the recordings out")
     return script
 
 

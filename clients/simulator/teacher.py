@@ -1,8 +1,8 @@
 """Open-ended learning with a simulated teacher, who teaches, asks and corrects (Chauhan and Seabra Lopes, 2011).
 
-The teacher introduces categories one at a time by showing an object. After each, she asks for the category of objects that the robot has not
-seen, of all categories taught so far in turn, and corrects every wrong answer. Once the last answers are good enough she introduces the next
-category; when they do not become so, the robot has reached its limit.
+The teacher introduces categories one at a time by showing an object. After each, she asks for the category of objects that the robot
+has not seen, of all categories taught so far in turn, and corrects every wrong answer. Once the last answers are good enough she
+introduces the next category; when they do not become so, the robot has reached its limit.
 """
 
 from __future__ import annotations
@@ -81,7 +81,12 @@ class Lessons:
     """Iterate to teach; `summary` afterwards."""
 
     def __init__(
-        self, robot: RobotClient, draw: Callable[[str, int], Subject], categories: list[str], conduct: Conduct, config: TeacherConfig | None = None
+        self,
+        robot: RobotClient,
+        draw: Callable[[str, int], Subject],
+        categories: list[str],
+        conduct: Conduct,
+        config: TeacherConfig | None = None,
     ) -> None:
         """`draw(category, n)` gives the n-th object of a category; raises IndexError where there are no more."""
         self._robot = robot

@@ -16,9 +16,11 @@ from numpy.typing import NDArray
 
 from clients.datasets.folders import Sequence, find_sequences
 from clients.robot import RobotClient
-from clients.simulator.episode import Episode, summarise
+from clients.simulator.episode import Conduct, Episode, shuffled
 from clients.simulator.pictures import fetch_pictures
+from clients.simulator.replay import ReplaySubject
 from clients.simulator.report import EpisodeRecord
+from clients.simulator.summary import summarise
 from core.backbones.base import Features
 from service.app import create_app
 from service.settings import Settings
@@ -86,7 +88,8 @@ def robot(url: str) -> Iterator[RobotClient]:
 def record(samples: list[Sequence], tmp_path_factory: pytest.TempPathFactory) -> EpisodeRecord:
     """An episode: one object twice from the same sides, which the backbone recognises, and another of its category, which it does not."""
     with serving(tmp_path_factory.mktemp("episode") / "memory") as address, RobotClient(address) as robot:
-        encounters = list(Episode(robot, [samples[0], samples[0], samples[1]], views=12, seed=1))
-        pictures = [fetch_pictures(robot, encounter) for encounter in encounters]
+        subjects = shuffled([ReplaySubject(samples[index]) for index in (0, 0, 1)], seed=1)
+        encounters = list(Episode(robot, subjects, Conduct(views=12, seed=1)))
+        pictures = {index: fetch_pictures(robot, encounter) for index, encounter in enumerate(encounters)}
         settings = {"seed": 1, "views": 12}
         return EpisodeRecord(summarise(encounters, 9.0), encounters, pictures, robot.categories(), robot.info(), settings)

@@ -143,7 +143,7 @@ def test_a_folder_of_many_objects_and_an_unknown_category_are_refused(url: str, 
 
 def test_missing_samples_are_said_to_be_missing(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(shipped, "SAMPLES", tmp_path / "none")
-    failed = onelook("simulate")
+    failed = onelook("simulate", "--world", "replay", "--out", tmp_path / "out")
     assert failed.exit_code == 1
     assert "--data" in failed.output
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 from dataclasses import replace
-from typing import Any
 
 import pytest
 from rich.console import Console
@@ -12,14 +11,13 @@ from rich.console import Console
 from clients.datasets.folders import Sequence, load_burst
 from clients.errors import ClientError
 from clients.pose_error import PoseError
-from clients.robot import Observation, RobotClient
-from clients.simulator.episode import Encounter, Episode, Verdict, judge, summarise
+from clients.robot import RobotClient
+from clients.simulator.encounter import Encounter, Founder, Verdict, judge
+from clients.simulator.episode import Conduct, Episode, require_own_memory, shuffled
 from clients.simulator.live import show, summary_rows
+from clients.simulator.replay import ReplaySubject
 from clients.simulator.report import EpisodeRecord
-
-
-def seen(outcome: Any) -> Observation:
-    return Observation("id", outcome, None, None, None, None, None, None, (), 0.7, {}, {})
+from clients.simulator.summary import summarise
 
 
 @pytest.mark.parametrize(
@@ -27,19 +25,16 @@ def seen(outcome: Any) -> Observation:
     [
         ("novel", None, False, Verdict.NEW),
         ("novel", None, True, Verdict.FALSE_NOVEL),
-        ("known", "same", True, Verdict.RECOGNISED),
-        ("known", "other", True, Verdict.FALSE_KNOWN),
-        ("known", "other", False, Verdict.FALSE_KNOWN),
+        ("known", "cup", True, Verdict.RECOGNISED),
+        ("known", "car", True, Verdict.FALSE_KNOWN),
+        ("known", "car", False, Verdict.FALSE_KNOWN),
         ("known", None, False, Verdict.FALSE_KNOWN),
         ("uncertain", None, True, Verdict.UNDECIDED),
     ],
 )
-def test_decisions_are_judged_by_who_founded_the_category(
-    samples: list[Sequence], outcome: str, founder: str | None, in_memory: bool, verdict: Verdict
-) -> None:
-    category = samples[0].category
-    founders = {"same": samples[0], "other": next(each for each in samples if each.category != category), None: None}
-    assert judge(seen(outcome), category, founders[founder], in_memory) is verdict
+def test_decisions_are_judged_by_who_founded_the_category(outcome: str, founder: str | None, in_memory: bool, verdict: Verdict) -> None:
+    who = None if founder is None else Founder(founder, f"{founder}/1", None)
+    assert judge(outcome, "cup", who, in_memory) is verdict
 
 
 @pytest.fixture
@@ -49,7 +44,7 @@ def met(record: EpisodeRecord) -> list[Encounter]:
 
 
 def test_an_episode_learns_recognises_and_scores(met: list[Encounter], samples: list[Sequence]) -> None:
-    first, last = ([each for each in met if each.sequence is samples[index]] for index in (0, 1))
+    first, last = ([each for each in met if each.name == samples[index].name] for index in (0, 1))
     assert [each.number for each in met] == [1, 2, 3]
     assert {each.verdict for each in met} == {Verdict.NEW, Verdict.RECOGNISED, Verdict.FALSE_NOVEL}
     again = next(each for each in first if each.verdict is Verdict.RECOGNISED)
@@ -57,7 +52,7 @@ def test_an_episode_learns_recognises_and_scores(met: list[Encounter], samples: 
     assert again.error is not None
     assert again.error.rotation_deg < 10
     assert last[0].learnt is not None
-    assert len(last[0].offsets_deg) == last[0].learnt.views == 10
+    assert len(last[0].offsets_deg) == last[0].learnt_views == 10
 
 
 def test_a_summary_counts_verdicts_and_good_poses(met: list[Encounter]) -> None:
@@ -67,6 +62,7 @@ def test_a_summary_counts_verdicts_and_good_poses(met: list[Encounter]) -> None:
     without_pose = replace(again, error=None)
     summary = summarise([*met, wrong, without_pose, without_pose], total_s=60.0)
     assert (summary.objects, summary.kinds, summary.categories, summary.met_again) == (6, 1, 2, 5)
+    assert summary.false_novel_rate == pytest.approx(20)
     assert (summary.correct_known, summary.false_novel, summary.false_known) == (4, 1, 0)
     assert summary.acc30 == pytest.approx(25)
     assert summary.median_deg == pytest.approx((again.error.rotation_deg + 40) / 2)
@@ -78,19 +74,41 @@ def test_an_episode_without_known_objects_has_no_accuracy(met: list[Encounter]) 
     assert "Acc30" not in {what for what, _, _ in summary_rows(summary)}
 
 
-def test_the_order_depends_on_the_seed_alone(robot: RobotClient, samples: list[Sequence]) -> None:
-    orders = [[each.name for each in Episode(robot, samples, views=2, seed=seed).sequences] for seed in (3, 3, 4)]
+def test_the_order_depends_on_the_seed_alone(samples: list[Sequence]) -> None:
+    subjects = [ReplaySubject(each) for each in samples]
+    orders = [[each.name for each in shuffled(subjects, seed)] for seed in (3, 3, 4)]
     assert orders[0] == orders[1] != orders[2]
 
 
-def test_a_used_memory_is_refused(robot: RobotClient, samples: list[Sequence]) -> None:
+def test_a_used_memory_is_refused_unless_the_episode_made_it(robot: RobotClient, samples: list[Sequence], met: list[Encounter]) -> None:
     burst = load_burst(samples[0], range(2))
     scan = robot.scan(burst)
     for view in burst.views:
         scan.add(view)
-    scan.complete()
+    category = scan.complete()
     with pytest.raises(ClientError, match="not empty"):
-        Episode(robot, samples, views=2, seed=0)
+        require_own_memory(robot, [])
+    require_own_memory(robot, [replace(met[0], learnt=category.id)])
+
+
+def test_an_encounter_is_a_line_of_json_and_back(met: list[Encounter]) -> None:
+    for each in met:
+        assert Encounter.from_json(each.as_json()) == each
+
+
+def test_a_resumed_episode_meets_the_rest_and_knows_who_founded_what(url: str, samples: list[Sequence]) -> None:
+    subjects = [ReplaySubject(samples[0])] * 2
+    conduct = Conduct(views=12)
+    with RobotClient(url) as robot:
+        (first,) = list(Episode(robot, subjects[:1], conduct))
+        (second,) = list(Episode(robot, subjects, conduct, done=[Encounter.from_json(first.as_json())]))
+    assert (second.number, second.verdict, second.kind) == (2, Verdict.RECOGNISED, samples[0].category)
+    assert second.error is not None
+
+
+def test_lost_views_never_arrive(robot: RobotClient, samples: list[Sequence]) -> None:
+    (met,) = list(Episode(robot, [ReplaySubject(samples[0])], Conduct(views=12, lost_views=0.5)))
+    assert 1 <= met.views < 12
 
 
 def test_the_terminal_shows_wrong_decisions_in_words(met: list[Encounter]) -> None:
@@ -98,4 +116,4 @@ def test_the_terminal_shows_wrong_decisions_in_words(met: list[Encounter]) -> No
     show(met, total=3, console=Console(file=output, width=160))
     assert "FALSE" in output.getvalue()
     assert "memory empty" in output.getvalue()
-    assert met[0].sequence.name in output.getvalue()
+    assert met[0].name in output.getvalue()

@@ -8,8 +8,8 @@ from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
-from clients.simulator.episode import Encounter, Verdict
-from clients.simulator.report import EpisodeRecord, write_json, write_report
+from clients.simulator.encounter import Encounter, Verdict
+from clients.simulator.report import ALL_SHOWN, WORST, EpisodeRecord, write_json, write_report
 
 
 class Page(HTMLParser):
@@ -63,12 +63,27 @@ def test_the_report_shows_every_encounter_with_its_pictures(record: EpisodeRecor
     page = Page(path.read_text())
     text = " ".join(page.text.split())
     assert [each for each in page.ids if each.startswith("encounter")] == ["encounter-1", "encounter-2", "encounter-3"]
-    for encounter, pictures in zip(record.encounters, record.pictures):
-        assert encounter.sequence.name in text
+    for index, encounter in enumerate(record.encounters):
+        pictures = record.pictures[index]
+        assert encounter.name in text
         assert (pictures.correspondences is None) == (encounter.verdict is not Verdict.RECOGNISED)
         assert (pictures.scanned is None) == (encounter.learnt is None)
     assert "false novel: its category was in the memory" in text
     assert "recognised as car" in text
+
+
+def test_a_long_episode_shows_its_charts_and_what_went_worst(record: EpisodeRecord, tmp_path: Path) -> None:
+    many = [replace(record.encounters[0], number=number) for number in range(1, ALL_SHOWN + 1)]
+    wrong = replace(next(each for each in record.encounters if each.verdict is Verdict.FALSE_NOVEL), number=ALL_SHOWN + 1)
+    encounters = [*many, wrong]
+    pictures = dict.fromkeys(range(len(encounters)), record.pictures[0])
+    write_report(replace(record, encounters=encounters, pictures=pictures), tmp_path / "report.html")
+    page = Page((tmp_path / "report.html").read_text())
+    shown = [each for each in page.ids if each.startswith("encounter")]
+    assert len(shown) == WORST
+    assert shown[0] == f"encounter-{ALL_SHOWN + 1}"
+    for chart in ("Taken for what", "against the threshold", "Rotation errors", "Time of an answer"):
+        assert chart in page.text
 
 
 def test_failures_and_foreign_text_are_shown_as_text(record: EpisodeRecord, tmp_path: Path) -> None:
@@ -82,5 +97,5 @@ def test_the_json_has_the_summary_and_a_row_an_encounter(record: EpisodeRecord, 
     written = json.loads((tmp_path / "episode.json").read_text())
     assert written["summary"]["objects"] == len(written["rows"]) == 3
     recognised = next(row for row in written["rows"] if row["outcome"] == "known")
-    assert recognised["rotation_error_deg"] < 10
+    assert recognised["error"]["rotation_deg"] < 10
     assert written["meta"]["seed"] == 1
