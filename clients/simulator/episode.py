@@ -11,8 +11,6 @@ import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
-import numpy as np
-
 from clients.answers import Category
 from clients.errors import ClientError, ServiceProblem
 from clients.pose_error import PoseError, pose_error
@@ -20,7 +18,7 @@ from clients.robot import Observation, RobotClient
 from clients.simulator.arm import FREE, Arm, ArmConfig
 from clients.simulator.encounter import Encounter, Founder, Verdict, best_view, judge
 from clients.simulator.world import Subject, WorldObject
-from core.views import Burst, FloatArray
+from core.views import Burst
 
 MOST_LOOKS = 3
 """Observations of one object at most: after two rounds of further views a robot goes on."""
@@ -149,10 +147,9 @@ class Episode:
         """What the service says; where it is uncertain the views it asks for are added and it is asked again."""
         for looks in range(1, MOST_LOOKS + 1):
             seen = self._robot.observe(burst)
-            wanted = _further(seen)
-            if not wanted or looks == MOST_LOOKS:
+            if seen.outcome != "uncertain" or seen.viewpoints is None or looks == MOST_LOOKS:
                 break
-            more = list(arm.look_around(wanted, arm.world.center_m))
+            more = list(arm.look_around(list(seen.viewpoints), arm.world.center_m))
             if not more:
                 break
             burst = Burst([*burst.views, *more])
@@ -176,12 +173,6 @@ def shuffled(subjects: Sequence[Subject], seed: int) -> list[Subject]:
     order = list(subjects)
     random.Random(seed).shuffle(order)
     return order
-
-
-def _further(seen: Observation) -> list[FloatArray]:
-    """The camera poses, each of shape (4, 4), that would settle an uncertain decision."""
-    asked = seen.raw.get("viewpoints") or {}
-    return [np.array(pose) for pose in asked.get("world_from_camera", ())]
 
 
 def _carry_out(seen: Observation, arm: Arm) -> tuple[Category | None, str | None]:
