@@ -59,16 +59,17 @@ def paper(
 def discovery(
     data: Data,
     score: Annotated[list[str] | None, typer.Option(help="Score of the decision; may be repeated; all where left out.")] = None,
-    episodes: Annotated[int, typer.Option(min=1)] = 100,
+    episodes: Annotated[int, typer.Option(min=1)] = 1000,
     length: Annotated[int, typer.Option(min=1, help="Objects met in an episode.")] = 250,
     seed: Seed = 0,
     backbone: Backbone = BACKBONE,
+    plot: Annotated[Path | None, typer.Option(help="File for the curves, .png or .svg.")] = None,
     json: JsonFile = None,
 ) -> None:
     """How well known and novel objects are told apart."""
     from benchmarks.discovery import run
 
-    run(data, score or [], json, episodes, length, seed, backbone)
+    run(data, score or [], json, episodes, length, seed, backbone, plot)
 
 
 @app.command()
