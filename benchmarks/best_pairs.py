@@ -103,13 +103,10 @@ class BestSource:
         to_burst = np.where(there, match[founder, burst], -np.inf)
         own = np.where(self._of[:, None, held] == shortlist[:, :, None], match[held, burst], -np.inf)  # (T, S, H)
         member = held[own.argmax(axis=2)]
-        total = np.zeros(shortlist.shape)
-        for slot in range(shortlist.shape[1]):
-            apart = np.arange(there.shape[1]) != shortlist[:, slot, None]
-            to_member = np.where(there, match[founder, member[:, slot, None]], -np.inf)
-            for reached in (to_burst, to_member):
-                total[:, slot] += cohort_level(np.where(apart, reached, -np.inf), self._pairs.prior.cohort)
-        return total
+        to_member = np.where(there[:, None], match[founder[:, None], member[:, :, None]], -np.inf)  # (T, S, C)
+        both = np.stack([np.broadcast_to(to_burst[:, None], to_member.shape), to_member])
+        both[:, np.arange(there.shape[1]) == shortlist[:, :, None]] = -np.inf
+        return cohort_level(both, self._pairs.prior.cohort).sum(axis=0)
 
     def _verification(self, burst: int, shortlist: IntArray, evidence: FloatArray, verify: IntArray | None) -> FloatArray:
         assert self._agreement is not None

@@ -34,7 +34,7 @@ from core.encode import Encoder
 from core.errors import InvalidInput
 from core.novelty import BEST, SCORES, require_score
 
-LEVELS = np.concatenate([np.linspace(0, 0.9, 10), 1 - np.geomspace(0.1, 0.001, 24), [1.0]])
+LEVELS = np.concatenate([np.linspace(0, 0.9, 7), 1 - np.geomspace(0.1, 0.001, 20), [1.0]])
 """Quantiles of the similarities between bursts at which a curve has a threshold: dense at the top, where the errors trade."""
 SUMS = 30
 """Further thresholds of a sum, which grows with the members of a category."""
@@ -108,7 +108,8 @@ def run(
     orders = draw_orders(episodes, labels, length, seed)
     started = time.perf_counter()
     rows = [row for name, table in tables.items() for row in score_rows(name, table, labels, orders)]
-    rates = [row for name, table in tables.items() if isinstance(table, BestPairs) for row in rate_rows(name, table, labels, orders)]
+    first = tables.get(BEST)
+    rates = rate_rows(BEST, first, labels, orders) if isinstance(first, BestPairs) else []
     meta = {
         "benchmark": "discovery",
         "data": data,

@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 FloatArray = NDArray[np.floating]
 
@@ -86,7 +86,7 @@ class Calibration:
 
     def threshold(self, rate: float) -> float:
         """What an object of no known category exceeds with this probability."""
-        return self.location + self.spread * float(student.ppf(1 - rate, self.freedom)) * float(np.sqrt(1 + 1 / (self.freedom + 1)))
+        return self.location + self.spread * float(stdtrit(self.freedom, 1 - rate)) * float(np.sqrt(1 + 1 / (self.freedom + 1)))
 
     def probability(self, evidence: float) -> float:
         """That the most similar category is right, with even odds beforehand; grows with the evidence."""

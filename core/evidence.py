@@ -87,10 +87,10 @@ def cohort_level(matches: FloatArray, prior: float) -> FloatArray:
 
     −inf stands for no category; what is missing to COHORT counts as `prior`.
     """
-    short = max(COHORT - matches.shape[-1], 0)
-    padded = np.concatenate([matches, np.full((*matches.shape[:-1], short), -np.inf)], axis=-1)
-    best = -np.partition(-padded, COHORT - 1, axis=-1)[..., :COHORT]
-    return np.asarray(np.where(np.isfinite(best), best, prior).mean(axis=-1))
+    count = matches.shape[-1]
+    best = np.partition(matches, count - COHORT, axis=-1)[..., -COHORT:] if count > COHORT else matches
+    there = best > -np.inf
+    return np.asarray((np.where(there, best, prior).sum(axis=-1) + prior * max(COHORT - count, 0)) / COHORT)
 
 
 class HasPooled(Protocol):

@@ -59,7 +59,7 @@ def samples() -> list[Sequence]:
 @contextmanager
 def serving(memory: Path) -> Iterator[str]:
     """The address of a service for which everything but an identical burst is novel."""
-    app = create_app(Settings(data_dir=memory, threshold=0.9999), backbone=CentreBackbone())
+    app = create_app(Settings(data_dir=memory, score="pooled_best_view", threshold=0.9999), backbone=CentreBackbone())
     server = uvicorn.Server(uvicorn.Config(app, host="127.0.0.1", port=0, log_level="warning"))
     thread = threading.Thread(target=server.run, daemon=True)
     thread.start()
