@@ -12,17 +12,22 @@ from __future__ import annotations
 
 import asyncio
 import functools
-from collections.abc import Callable, Coroutine, Sequence
+from collections.abc import AsyncIterator, Callable, Coroutine, Mapping, Sequence
+from contextlib import AsyncExitStack
 from types import TracebackType
 from typing import Any, Concatenate, ParamSpec, TypeVar
 
 import httpx
+from websockets.asyncio.client import connect
 
 from clients.answers import Category, Observation, ScanRequest, Viewpoints
 from clients.calls import curating, observing, operating, rearranging, scanning
 from clients.calls.call import Call
-from clients.exchange import Retry, Wait, exchange
-from clients.robot import DEFAULT_URL, TIMEOUT_S, timeouts, with_self
+from clients.events import PATH as EVENTS
+from clients.events import Event, EventReader
+from clients.exchange import Retry, Wait, broken, connection_to, endless, exchange, problem_of
+from clients.robot import CONNECT_TIMEOUT_S, DEFAULT_URL, TIMEOUT_S, timeouts, with_self
+from clients.tracking import MAX_MESSAGE_BYTES, Conversation, Tracked, websocket_url
 from core.views import Burst, View
 
 P = ParamSpec("P")
@@ -147,3 +152,59 @@ class AsyncRobotClient:
     forget_goal = _method(rearranging.forget_goal, _as_is)
     plan = _method(rearranging.plan, _as_is)
     info = _method(operating.info, _as_is)
+    memory = _method(operating.memory, _as_is)
+    calibrate = _method(operating.calibrate, _as_is)
+    backup = _method(operating.backup, _as_is)
+    export_memory = _method(operating.export_memory, _as_is)
+    import_memory = _method(operating.import_memory, _as_is)
+
+    async def events(self, after: int | None = None) -> AsyncIterator[Event]:
+        """As `RobotClient.events`: `async for event in robot.events()`."""
+        reader, url = EventReader(), str(self._http.base_url).rstrip("/")
+        params = {} if after is None else {"after": after}
+        try:
+            async with self._http.stream("GET", EVENTS, params=params, timeout=endless(self._http.timeout)) as response:
+                if response.is_error:
+                    await response.aread()
+                    raise problem_of(response)
+                async for line in response.aiter_lines():
+                    if (event := reader.feed(line)) is not None:
+                        yield event
+        except httpx.TransportError as error:
+            raise broken(error, url) from error
+
+    def track(self, category_id: str | None = None, **options: Any) -> AsyncTrack:
+        """As `RobotClient.track`: `async with robot.track() as track: tracked = await track.step(view)`."""
+        return AsyncTrack(websocket_url(str(self._http.base_url)), {"category_id": category_id, **options})
+
+
+class AsyncTrack:
+    """A connection that follows one object; an asynchronous context manager."""
+
+    def __init__(self, url: str, options: Mapping[str, Any]) -> None:
+        self._url = url
+        self._talk = Conversation()
+        self._hello = self._talk.hello(**options)
+        self._open = AsyncExitStack()
+
+    async def __aenter__(self) -> AsyncTrack:
+        """Raises Unreachable, or the ServiceProblem that the service answers."""
+        with connection_to(self._url):
+            async with AsyncExitStack() as opening:
+                opened = connect(self._url, max_size=MAX_MESSAGE_BYTES, open_timeout=CONNECT_TIMEOUT_S)
+                self._socket = await opening.enter_async_context(opened)
+                await self._socket.send(self._hello)
+                self._talk.read(await self._socket.recv())
+                self._open = opening.pop_all()
+        return self
+
+    async def __aexit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        await self._open.aclose()
+
+    async def step(self, view: View, time_s: float | None = None) -> Tracked:
+        """As `Track.step`."""
+        with connection_to(self._url):
+            await self._socket.send(self._talk.frame(view, time_s))
+            while (answer := self._talk.read(await self._socket.recv())) is None:
+                pass
+            return answer

@@ -11,13 +11,15 @@ from __future__ import annotations
 import math
 import random
 import uuid
-from collections.abc import Generator, Mapping
+from collections.abc import Generator, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from datetime import datetime, timezone
 from email.utils import parsedate_to_datetime
 from typing import Any, TypeVar
 
 import httpx
+from websockets.exceptions import WebSocketException
 
 from clients.calls.call import Call
 from clients.errors import ServiceProblem, TooSlow, Unreachable, problem_from_json
@@ -113,15 +115,35 @@ def retry_after_s(headers: Mapping[str, str]) -> float | None:
 
 def _failure(came: httpx.Response | httpx.TransportError, call: Call[Any], url: str) -> Exception:
     if isinstance(came, httpx.Response):
-        return _problem(came)
+        return problem_of(came)
     if isinstance(came, (httpx.ConnectError, httpx.ConnectTimeout)):
         return Unreachable(f"nothing answers at {url}; start the service with `onelook serve`, or give its address")
     if isinstance(came, httpx.TimeoutException):
         return TooSlow(f"{url} did not answer {call.method} {call.path} in time; send fewer views, or allow more time")
-    return Unreachable(f"the connection to {url} broke ({came}); look at the service's log")
+    return broken(came, url)
 
 
-def _problem(response: httpx.Response) -> ServiceProblem:
+def broken(why: Exception, url: str) -> Unreachable:
+    """The exception for a connection that did not last."""
+    return Unreachable(f"the connection to {url} broke ({why}); look at the service's log")
+
+
+@contextmanager
+def connection_to(url: str) -> Iterator[None]:
+    """Makes what is wrong with a WebSocket Unreachable."""
+    try:
+        yield
+    except (OSError, WebSocketException) as error:
+        raise Unreachable(f"no connection to {url} ({error}); start the service with `onelook serve`, or give its address") from error
+
+
+def endless(timeout: httpx.Timeout) -> httpx.Timeout:
+    """The same, but for reading: events may be hours apart."""
+    return httpx.Timeout(connect=timeout.connect, write=timeout.write, pool=timeout.pool, read=None)
+
+
+def problem_of(response: httpx.Response) -> ServiceProblem:
+    """The exception for an answer that is an error."""
     if response.headers.get("content-type", "").startswith(PROBLEM):
         return problem_from_json(response.status_code, response.json(), retry_after_s(response.headers))
     found = f"{response.url} answered {response.status_code} {response.reason_phrase}"

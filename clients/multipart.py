@@ -30,9 +30,9 @@ def burst_parts(burst: Burst, frame: str | None = None) -> list[Part]:
     if _all_or_none("camera", [view.camera for view in views]):
         about["views"] = [{"K": camera.K.tolist(), "world_from_camera": camera.world_from_camera.tolist()} for camera in burst.cameras]
     parts = [("burst", ("burst.json", json.dumps(about).encode(), "application/json"))]
-    parts += [_image("rgb", index, _jpeg(view)) for index, view in enumerate(views)]
+    parts += [_image("rgb", index, encode_colour(view)) for index, view in enumerate(views)]
     if _all_or_none("depth", [view.depth_m for view in views]):
-        parts += [_image("depth", index, _depth_png(view, index)) for index, view in enumerate(views)]
+        parts += [_image("depth", index, encode_depth(view, index)) for index, view in enumerate(views)]
     if _all_or_none("mask", [view.mask for view in views]):
         parts += [_image("mask", index, encode_png(np.asarray(view.mask, dtype=np.uint8) * 255)) for index, view in enumerate(views)]
     return parts
@@ -71,11 +71,13 @@ def _image(field: str, index: int, content: bytes) -> Part:
     return field, (f"{index:06}.{suffix}", content, media_type)
 
 
-def _jpeg(view: View) -> bytes:
+def encode_colour(view: View) -> bytes:
+    """A view's colour as JPEG."""
     return bytes(simplejpeg.encode_jpeg(np.ascontiguousarray(view.rgb), quality=JPEG_QUALITY, colorsubsampling="420"))
 
 
-def _depth_png(view: View, index: int) -> bytes:
+def encode_depth(view: View, index: int) -> bytes:
+    """The depth of view number `index` as a 16-bit PNG in units of DEPTH_UNIT_M. Raises InvalidInput where it reaches too far."""
     assert view.depth_m is not None
     units = np.round(view.depth_m / DEPTH_UNIT_M)
     if units.max() > np.iinfo(np.uint16).max:

@@ -15,17 +15,22 @@ from __future__ import annotations
 import functools
 import inspect
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack
 from types import TracebackType
-from typing import Concatenate, ParamSpec, TypeVar
+from typing import Any, Concatenate, ParamSpec, TypeVar
 
 import httpx
+from websockets.sync.client import connect
 
 from clients import answers
 from clients.answers import Category, ScanRequest, Viewpoints
 from clients.calls import curating, observing, operating, rearranging, scanning
 from clients.calls.call import Call
-from clients.exchange import Retry, Wait, exchange
+from clients.events import PATH as EVENTS
+from clients.events import Event, EventReader
+from clients.exchange import Retry, Wait, broken, connection_to, endless, exchange, problem_of
+from clients.tracking import MAX_MESSAGE_BYTES, Conversation, Tracked, websocket_url
 from core.views import Burst, View
 
 DEFAULT_URL = "http://127.0.0.1:8000"
@@ -163,6 +168,68 @@ class RobotClient:
     forget_goal = _method(rearranging.forget_goal, _as_is)
     plan = _method(rearranging.plan, _as_is)
     info = _method(operating.info, _as_is)
+    memory = _method(operating.memory, _as_is)
+    calibrate = _method(operating.calibrate, _as_is)
+    backup = _method(operating.backup, _as_is)
+    export_memory = _method(operating.export_memory, _as_is)
+    import_memory = _method(operating.import_memory, _as_is)
+
+    def events(self, after: int | None = None) -> Iterator[Event]:
+        """What happens in the service, as it happens, without end; first what happened after the event with the id `after`.
+
+        Raises Unreachable where the connection breaks: go on from the last event's id.
+        """
+        reader, url = EventReader(), str(self._http.base_url).rstrip("/")
+        params = {} if after is None else {"after": after}
+        try:
+            with self._http.stream("GET", EVENTS, params=params, timeout=endless(self._http.timeout)) as response:
+                if response.is_error:
+                    response.read()
+                    raise problem_of(response)
+                for line in response.iter_lines():
+                    if (event := reader.feed(line)) is not None:
+                        yield event
+        except httpx.TransportError as error:
+            raise broken(error, url) from error
+
+    def track(self, category_id: str | None = None, **options: Any) -> Track:
+        """Follows an object, of a category or of one that the first frames decide; `options` are `window`, `variant`, `weight`, `seed`.
+
+        with robot.track() as track:
+            for view in camera:
+                tracked = track.step(view)
+        """
+        return Track(websocket_url(str(self._http.base_url)), {"category_id": category_id, **options})
+
+
+class Track:
+    """A connection that follows one object; a context manager."""
+
+    def __init__(self, url: str, options: Mapping[str, Any]) -> None:
+        self._url = url
+        self._talk = Conversation()
+        self._hello = self._talk.hello(**options)
+        self._open = ExitStack()
+
+    def __enter__(self) -> Track:
+        """Raises Unreachable, or the ServiceProblem that the service answers."""
+        with ExitStack() as opening, connection_to(self._url):
+            self._socket = opening.enter_context(connect(self._url, max_size=MAX_MESSAGE_BYTES, open_timeout=CONNECT_TIMEOUT_S))
+            self._socket.send(self._hello)
+            self._talk.read(self._socket.recv())
+            self._open = opening.pop_all()
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self._open.close()
+
+    def step(self, view: View, time_s: float | None = None) -> Tracked:
+        """Where the object is in this view, taken at `time_s` on any clock. Raises the ServiceProblem of a view that cannot be used."""
+        with connection_to(self._url):
+            self._socket.send(self._talk.frame(view, time_s))
+            while (answer := self._talk.read(self._socket.recv())) is None:
+                pass
+            return answer
 
 
 def timeouts(timeout_s: float) -> httpx.Timeout:

@@ -20,8 +20,10 @@ def public(kind: type) -> dict[str, inspect.Signature]:
 
 
 def test_both_clients_have_the_same_methods_with_the_same_arguments() -> None:
-    assert public(AsyncRobotClient) == public(RobotClient)
-    assert all(inspect.iscoroutinefunction(getattr(AsyncRobotClient, name)) for name in public(AsyncRobotClient))
+    own, other = public(AsyncRobotClient), public(RobotClient)
+    assert {name: own[name].parameters for name in own} == {name: other[name].parameters for name in other}
+    waited_for = public(AsyncRobotClient).keys() - {"events", "track"}  # of which the one is iterated over, the other entered
+    assert all(inspect.iscoroutinefunction(getattr(AsyncRobotClient, name)) for name in waited_for)
 
 
 def test_a_novel_object_is_scanned_learnt_and_recognised(url: str, samples: list[Sequence]) -> None:

@@ -16,7 +16,13 @@ from service.app import create_app
 from service.settings import Settings
 
 MODULES = (curating, observing, operating, rearranging, scanning)
-EXAMPLES: dict[str, Any] = {"burst": Burst([View(np.zeros((32, 32, 3), np.uint8))]), "source": "o", "path": "/v1/x.png"}
+EXAMPLES: dict[str, Any] = {
+    "burst": Burst([View(np.zeros((32, 32, 3), np.uint8))]),
+    "source": "o",
+    "path": "/v1/x.png",
+    "archive": b"PK",
+    "false_known_rate": 0.1,
+}
 """Of parameters that are no id; an id is written as its path has it."""
 OF_A_SCAN = {"add_views": "add", "complete_scan": "complete", "exclude_viewpoints": "exclude"}
 """Calls that are methods of a scan."""
@@ -24,14 +30,10 @@ ELSEWHERE = {
     ("GET", "/healthz"): "for whoever watches the process",
     ("GET", "/readyz"): "for whoever watches the process",
     ("GET", "/metrics"): "for whoever watches the process",
-    ("GET", "/v1/events"): "a stream, not an answer",
-    ("GET", "/v1/memory"): "for whoever keeps the memory",
-    ("POST", "/v1/memory/backup"): "for whoever keeps the memory",
-    ("POST", "/v1/memory/calibrate"): "for whoever keeps the memory",
-    ("POST", "/v1/memory/export"): "for whoever keeps the memory",
-    ("POST", "/v1/memory/import"): "for whoever keeps the memory",
+    ("GET", "/v1/events"): "a stream: a method of its own",
 }
-"""Endpoints that no robot asks."""
+"""Endpoints that are no call."""
+STREAMS = {"events", "track"}
 
 
 def calls() -> dict[str, Call[Any]]:
@@ -63,5 +65,5 @@ def test_every_endpoint_but_pictures_is_a_call() -> None:
 def test_every_call_is_a_method_of_both_clients() -> None:
     methods = {name for name in calls() if name not in OF_A_SCAN}
     for client in (RobotClient, AsyncRobotClient):
-        assert methods == {name for name in vars(client) if not name.startswith("_")} - {"send", "close"}
+        assert methods == {name for name in vars(client) if not name.startswith("_")} - {"send", "close"} - STREAMS
     assert all(hasattr(Scan, name) for name in OF_A_SCAN.values())

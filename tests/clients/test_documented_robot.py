@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import re
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -14,7 +15,7 @@ from clients.datasets.folders import Sequence, load_burst
 from clients.robot import RobotClient
 
 ROOT = Path(__file__).parents[2]
-LOOP, ASYNCHRONOUS, ARM = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "robot.md").read_text(), re.DOTALL)
+LOOP, ASYNCHRONOUS, STREAMS, ARM = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "robot.md").read_text(), re.DOTALL)
 ADDRESS = "http://127.0.0.1:8000"
 
 
@@ -41,6 +42,17 @@ def test_the_loop_learns_a_category_and_knows_it_then(
 def test_the_asynchronous_loop_learns_too(url: str, samples: list[Sequence]) -> None:
     meet = run(ASYNCHRONOUS, url)["meet"]
     assert asyncio.run(meet(load_burst(samples[0], range(4)), recorded(samples[0].path))).name == "cup"
+
+
+def test_an_object_is_followed_and_events_are_told(robot: RobotClient, samples: list[Sequence], capsys: pytest.CaptureFixture[str]) -> None:
+    names: dict[str, Any] = {}
+    exec(compile(STREAMS, "docs/robot.md", "exec"), names)
+    (tracked,) = names["follow"](robot, load_burst(samples[0], [0]).views)
+    assert tracked.pose is None  # the memory is empty
+    robot.scan(load_burst(samples[0], range(2)))
+    events = robot.events(after=0)
+    names["watch"](SimpleNamespace(events=lambda: [next(events)]))
+    assert capsys.readouterr().out.startswith("scan_begun {")
 
 
 def test_the_arms_example_needs_only_a_camera(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,0 +1,114 @@
+"""Events and tracking, against a service, synchronous and asynchronous."""
+
+from __future__ import annotations
+
+import asyncio
+
+import numpy as np
+import pytest
+
+from clients import errors
+from clients.answers import Category
+from clients.asynchronous import AsyncRobotClient
+from clients.datasets.folders import Sequence, load_burst
+from clients.events import Event, EventReader
+from clients.robot import RobotClient
+from core.errors import InvalidInput
+from core.views import Burst, View
+
+
+@pytest.fixture
+def burst(samples: list[Sequence]) -> Burst:
+    """Four views of a car."""
+    return load_burst(samples[0], range(4))
+
+
+@pytest.fixture
+def learnt(robot: RobotClient, burst: Burst) -> Category:
+    """The category that it makes."""
+    scan = robot.scan(burst)
+    for view in burst.views:
+        scan.add(view)
+    return scan.complete("car")
+
+
+def test_lines_make_events() -> None:
+    reader = EventReader()
+    lines = ["id: 7", "event: scan_begun", 'data: {"created_at": "now",', 'data: "scan_id": "s"}', "", ": still here", ""]
+    assert [event for line in lines if (event := reader.feed(line))] == [Event(7, "scan_begun", "now", {"scan_id": "s"})]
+
+
+def test_what_happened_is_told_from_where_one_left_off(robot: RobotClient, learnt: Category) -> None:
+    told: list[Event] = []
+    for event in robot.events(after=0):
+        told.append(event)
+        if event.kind == "category_created":
+            break
+    assert told[0].kind == "scan_begun"
+    robot.rename(learnt.id, "auto")
+    renamed = next(robot.events(after=told[-1].id))
+    assert (renamed.kind, renamed.id > told[-1].id) == ("category_renamed", True)
+
+
+def test_events_are_told_asynchronously_too(url: str, learnt: Category) -> None:
+    async def first() -> Event:
+        async with AsyncRobotClient(url) as robot:
+            async for event in robot.events(after=0):
+                return event
+        raise AssertionError
+
+    assert asyncio.run(first()).kind == "scan_begun"
+
+
+def test_an_object_is_followed(robot: RobotClient, learnt: Category, burst: Burst) -> None:
+    with robot.track(learnt.id, window=4) as track:
+        answers = [track.step(view, time_s=0.1 * number) for number, view in enumerate(burst.views)]
+    assert [answer.frame_id for answer in answers] == [0, 1, 2, 3]
+    last = answers[-1]
+    assert last.category_id == learnt.id
+    assert last.pose is not None
+    np.testing.assert_allclose(last.pose.target_from_reference.as_matrix(), np.eye(4), atol=0.05)
+    assert last.pose.object_in_world.shape == (4, 4)
+    assert "found" in {change for answer in answers for change in answer.changes}
+
+
+def test_an_object_is_followed_asynchronously_too(url: str, learnt: Category, burst: Burst) -> None:
+    async def follow() -> int:
+        async with AsyncRobotClient(url) as robot, robot.track(learnt.id) as track:
+            return (await track.step(burst.views[0])).frame_id
+
+    assert asyncio.run(follow()) == 0
+
+
+def test_what_cannot_be_followed_is_said(robot: RobotClient, burst: Burst) -> None:
+    with pytest.raises(errors.NotFoundProblem), robot.track("nobody"):
+        pass
+    with pytest.raises(errors.InvalidInputProblem, match="window"), robot.track(window=99):
+        pass
+    with robot.track() as track, pytest.raises(InvalidInput, match="depth"):
+        track.step(View(burst.views[0].rgb))
+
+
+def test_without_a_service_the_remedy_is_said() -> None:
+    robot = RobotClient("http://127.0.0.1:9")
+    with pytest.raises(errors.Unreachable, match="onelook serve"), robot.track():
+        pass
+    with pytest.raises(errors.Unreachable, match="broke"):
+        next(robot.events())
+
+
+def test_a_refused_stream_is_a_problem(robot: RobotClient) -> None:
+    with pytest.raises(errors.InvalidInputProblem, match="after"):
+        next(robot.events(after=-1))
+
+
+def test_a_memory_goes_to_another_robot(robot: RobotClient, learnt: Category) -> None:
+    assert robot.memory().instances == 1
+    archive = robot.export_memory([learnt.id])
+    brought = robot.import_memory(archive)
+    assert (brought.categories, [each.id for each in brought.duplicates]) == ((), [learnt.id])
+    robot.forget(learnt.id)
+    assert [each.name for each in robot.import_memory(archive).categories] == ["car"]
+    assert robot.backup().files > 0
+    with pytest.raises(errors.ConflictProblem, match="ONELOOK_THRESHOLD"):  # as this service was started with one
+        robot.calibrate(0.02)
