@@ -21,7 +21,7 @@ from store.columns import files_from_json, files_to_json
 from store.connection import Connection, Row, new_id, only
 from store.folders import Files
 from store.instances import Instances, insert_instance
-from store.records import Assignment, Category, Instance
+from store.records import Category
 from store.retention import now
 from store.scans import OPEN
 
@@ -133,23 +133,6 @@ class Categories:
         self._require_part(category_id, moved)
         self._connection.create(self.folder(part_id), reference_files(reference, burst), insert, made=part_id)
         return self.get(part_id)
-
-    def assign(
-        self,
-        category_id: str,
-        encoded: EncodedBurst,
-        observation_id: str,
-        *,
-        similarity: float | None = None,
-        how: Assignment = "decision",
-    ) -> Instance:
-        """Adds the burst of an observation to a category. Raises NotFound, and Conflict where the observation is gone."""
-        with self._connection.change(category_id) as db:
-            self.get(category_id)
-            instance_id = insert_instance(
-                db, category_id, encoded, source="observation", source_id=observation_id, how=how, similarity=similarity
-            )
-        return self._instances.get(instance_id)
 
     def members(self) -> list[Member]:
         """Tokens of every burst assigned to a category, oldest first; see `Instances.members`."""

@@ -11,7 +11,7 @@ import numpy as np
 from sqlite_utils import Database
 
 from core.encode import EncodedBurst
-from core.errors import NotFound
+from core.errors import Conflict, NotFound
 from core.grounds import Grounds
 from core.novelty import Decision
 from core.scan import ScanRequest
@@ -101,6 +101,7 @@ class Observations:
             if request is not None:
                 insert_scan(db, new_id(), request, observation_id, ahead(self._connection.retention.scans))
             if joins is not None:
+                _require_living(db, joins.category_id)
                 insert_instance(
                     db,
                     joins.category_id,
@@ -177,6 +178,12 @@ class Observations:
             db.execute("UPDATE instances SET pictures = NULL WHERE pictures = ?", [f"observations/{each}"])
             db.execute("DELETE FROM observations WHERE id = ?", [each])
         return dropped
+
+
+def _require_living(db: Database, category_id: str) -> None:
+    """Raises Conflict for a category that is gone, or that was deleted or merged and could still be brought back."""
+    if db.execute("SELECT 1 FROM categories WHERE id = ? AND removed_by IS NULL", [category_id]).fetchone() is None:
+        raise Conflict(f"category {category_id!r} was deleted or merged meanwhile; send the request again")
 
 
 def _row(observation_id: str, answer: Answer, views: int, files: Files) -> Row:

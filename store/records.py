@@ -20,8 +20,8 @@ from core.views import FloatArray
 Outcome = Literal["known", "uncertain", "novel"]
 ScanState = Literal["requested", "collecting", "completed", "expired"]
 Anchor = Literal["center", "base"]
-Assignment = Literal["scan", "decision", "named", "confirmed"]
-"""How a burst came to a category: by the scan it was learnt from, by the decision, by the caller's word, or by a person's."""
+Assignment = Literal["scan", "decision", "named"]
+"""How a burst came to a category: by the scan it was learnt from, by the decision, or by the caller's word."""
 Action = Literal["create", "rename", "merge", "split", "delete", "forget", "import", "reembed", "undo"]
 
 

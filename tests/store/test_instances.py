@@ -52,9 +52,13 @@ def test_an_observation_joins_in_the_step_that_keeps_it(memory: Memory, category
     assert (joined.source, joined.source_id, joined.how, joined.similarity) == ("observation", observation.id, "decision", 0.9)
 
 
-def test_an_observation_that_cannot_join_is_not_kept(memory: Memory, burst: Burst, encoded: EncodedBurst) -> None:
-    with pytest.raises(Conflict, match="deleted meanwhile"):
-        memory.observations.create(answer("gone"), burst, FEATURES, joins=Joins("gone", encoded, 0.9, "decision"))
+def test_an_observation_that_cannot_join_is_not_kept(
+    memory: Memory, category: Category, other: Category, burst: Burst, encoded: EncodedBurst
+) -> None:
+    memory.categories.merge(category.id, other.id)
+    for gone in ("gone", category.id):
+        with pytest.raises(Conflict, match="meanwhile; send the request again"):
+            memory.observations.create(answer(gone), burst, FEATURES, joins=Joins(gone, encoded, 0.9, "decision"))
     assert memory.observations.latest(1) == []
 
 

@@ -84,11 +84,3 @@ def test_a_category_deleted_meanwhile_is_told(memory: Memory, burst: Burst) -> N
     with pytest.raises(Conflict, match="deleted meanwhile"):
         memory.observations.create(known("gone"), burst, FEATURES)
     assert memory.observations.latest(10) == []
-
-
-def test_a_learnt_observation_is_a_member(memory: Memory, reference: Reference, burst: Burst, encoded: EncodedBurst) -> None:
-    category = memory.categories.create(reference, burst, encoded)
-    seen = memory.observations.create(known(category.id), burst, FEATURES)
-    memory.categories.assign(category.id, encoded, seen.id)
-    assert memory.categories.get(category.id).instances == 2
-    assert len(memory.categories.members()) == 2
