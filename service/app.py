@@ -7,6 +7,8 @@ from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager, contextmanager
 from importlib.metadata import version
 
+import anyio
+from anyio.to_thread import run_sync
 from fastapi import FastAPI
 
 from core.backbones.base import Backbone
@@ -27,6 +29,7 @@ DESCRIPTION = """A growing memory of object categories for robots: look once at 
 Lengths are metres, camera axes are OpenCV's (x right, y down, z forward), quaternions are (w, x, y, z); `b_from_a` maps points of frame a
 to frame b.
 Every error is `application/problem+json` (RFC 9457)."""
+PRUNE_EVERY_S = 3600
 log = logging.getLogger("onelook")
 
 
@@ -41,7 +44,10 @@ def create_app(settings: Settings, *, backbone: Backbone | None = None) -> FastA
             app.state.agent = agent
             app.state.work = work = WorkQueue(settings.workers, settings.queue)
             metrics.watch_work(lambda: work.pending)
-            yield
+            async with anyio.create_task_group() as tasks:
+                tasks.start_soon(_keep_pruned, agent.memory)
+                yield
+                tasks.cancel_scope.cancel()
 
     app = FastAPI(
         title="OneLook",
@@ -56,20 +62,19 @@ def create_app(settings: Settings, *, backbone: Backbone | None = None) -> FastA
     app.add_middleware(UploadLimit, max_mb=settings.max_upload_mb)
     app.add_middleware(Measured, metrics=metrics)
     errors.install(app)
-    openapi.install(app)
-    for router in (
-        observations.router,
-        scans.router,
-        categories.router,
-        goals.router,
-        memory.router,
-        memory.live,
-        track.router,
-        health.router,
-    ):
+    routers = (observations.router, scans.router, categories.router, goals.router, memory.router, memory.live, track.router, health.router)
+    for router in routers:
         app.include_router(router)
+    openapi.install(app, [route for router in routers for route in router.routes])
     app.state.made = observations.MADE | scans.MADE | categories.MADE | goals.MADE | memory.MADE
     return app
+
+
+async def _keep_pruned(memory: Memory) -> None:
+    """Ends what has an end: scans that no views come for, what can no longer be undone, keys of old requests."""
+    while True:
+        await anyio.sleep(PRUNE_EVERY_S)
+        await run_sync(memory.prune)
 
 
 @contextmanager

@@ -88,6 +88,8 @@ def field_path(location: Sequence[int | str]) -> str:
 
 def _on_http_exception(request: Request, error: Exception) -> JSONResponse:
     assert isinstance(error, HTTPException)
+    if error.status_code == 400:  # what FastAPI says of a body that is no text
+        return _answer(problem_of(core.InvalidInput("body", "is not JSON: it is not UTF-8 text")))
     title = HTTPStatus(error.status_code).phrase
     detail = str(error.detail)
     if error.status_code == 404 and detail == title:

@@ -36,7 +36,7 @@ class Settings(BaseSettings):
     score: str = Field(DEFAULT_SCORE, description="How similar two bursts are, for the decision.")
     threshold: float | None = Field(None, description="Least similarity of a known object; the score's own default where left out.")
     false_known_rate: float = Field(
-        0.01, gt=0, le=0.5, description="Of objects of no known category, the share that may be called known; of score `best`."
+        0.01, ge=1e-4, le=0.5, description="Of objects of no known category, the share that may be called known; of score `best`."
     )
     variant: str = Field("best", description="Variant of the pose pipeline.")
     max_upload_mb: int = Field(128, gt=0, description="Largest request body, in megabytes of 1 000 000 bytes.")

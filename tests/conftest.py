@@ -102,6 +102,12 @@ def backbone() -> ColourBackbone:
 
 
 @pytest.fixture(scope="session")
+def colour_backbone() -> ColourBackbone:
+    """The same one for all tests."""
+    return ColourBackbone()
+
+
+@pytest.fixture(scope="session")
 def ellipsoid() -> type[Ellipsoid]:
     """The object of the synthetic world."""
     return Ellipsoid

@@ -54,7 +54,7 @@ class Calibrate(BaseModel):
     model_config = ConfigDict(extra="forbid", json_schema_extra={"example": {"false_known_rate": 0.02}})
 
     false_known_rate: float | None = Field(
-        gt=0, lt=0.5, description="Of objects of no known category, the share that may be called known; null: ONELOOK_FALSE_KNOWN_RATE."
+        ge=1e-4, le=0.5, description="Of objects of no known category, the share that may be called known; null: ONELOOK_FALSE_KNOWN_RATE."
     )
 
 

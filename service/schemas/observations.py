@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from core.pose import PoseOptions
 from core.sim3 import Sim3
@@ -23,6 +23,11 @@ from store import records
 PixelBox = Annotated[list[float], Field(min_length=4, max_length=4)]
 
 
+def _number(value: object) -> object:
+    """A query has text only, which a literal number is not made of."""
+    return int(value) if isinstance(value, str) and value.isdecimal() else value
+
+
 class ObserveQuery(BaseModel):
     """Query options of an observation."""
 
@@ -31,7 +36,7 @@ class ObserveQuery(BaseModel):
     category_id: str | None = Field(None, description="Takes the object for one of this category and skips the decision.")
     threshold: float | None = Field(None, allow_inf_nan=False, description="Least similarity of a known object, for this request.")
     false_known_rate: float | None = Field(
-        None, gt=0, le=0.5, description="Of objects of no known category, the share that may be called known, for this request."
+        None, ge=1e-4, le=0.5, description="Of objects of no known category, the share that may be called known, for this request."
     )
     views_used: int | None = Field(None, ge=1, description="Uses only this many of the burst's views, the first ones.")
     learn: bool = Field(
@@ -43,7 +48,9 @@ class ObserveQuery(BaseModel):
     )
     alternatives: int | None = Field(None, ge=0, le=10, description="Most other transforms to be given; of variant `best`.")
     variant: str | None = Field(None, description="Variant of the pose pipeline, for this request.")
-    dof: Literal[7, 9] | None = Field(None, description="9 gives each axis of the object a scale of its own; 7 where left out.")
+    dof: Annotated[Literal[7, 9] | None, BeforeValidator(_number)] = Field(
+        None, description="9 gives each axis of the object a scale of its own; 7 where left out."
+    )
     dims: int | None = Field(None, ge=1, le=4096, description="Principal components of a descriptor that are compared.")
     method: str | None = Field(None, description="How correspondences are found.")
     consensus_deg: float | None = Field(None, gt=0, le=180, description="Angle within which view pairs agree, of variants with consensus.")

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import importlib.metadata
+import time
 
 import pytest
 from fastapi.testclient import TestClient
 
+import service.app
 from core.errors import Conflict, InvalidInput, OneLookError
 from service.app import create_app
 from service.errors import KINDS, problem_of
@@ -39,8 +41,8 @@ def test_a_memory_of_another_backbone_is_refused_at_the_start(settings, backbone
 
 
 def test_an_unknown_score_is_refused_at_the_start(settings, backbone):
-    wrong = settings.model_copy(update={"score": "best"})
-    with pytest.raises(InvalidInput, match="'best' is none of"), TestClient(create_app(wrong, backbone=backbone)):
+    wrong = settings.model_copy(update={"score": "nonsense"})
+    with pytest.raises(InvalidInput, match="'nonsense' is none of"), TestClient(create_app(wrong, backbone=backbone)):
         pass
 
 
@@ -121,3 +123,38 @@ def test_operation_ids_are_the_routes_names(client):
     document = client.get("/openapi.json").json()
     ids = {operation["operationId"] for path in document["paths"].values() for operation in path.values()}
     assert {"observe", "begin_scan", "complete_scan", "list_categories", "info"} <= ids
+
+
+def test_what_every_exchange_has_in_common_is_in_the_schema(client):
+    paths = client.get("/openapi.json").json()["paths"]
+    read, write = paths["/v1/categories/{category_id}"]["get"], paths["/v1/observations"]["post"]
+    assert "If-None-Match" in [parameter["name"] for parameter in read["parameters"]]
+    assert "304" in read["responses"]
+    assert "Idempotency-Key" in [parameter["name"] for parameter in write["parameters"]]
+    assert {"409", "413", "415", "422", "503"} <= set(write["responses"])
+
+
+def test_every_documented_error_is_a_problem(client):
+    paths = client.get("/openapi.json").json()["paths"]
+    for path, methods in paths.items():
+        for method, operation in methods.items():
+            for status, response in operation["responses"].items():
+                if status >= "400":
+                    assert list(response["content"]) == ["application/problem+json"], (method, path, status)
+
+
+def test_a_body_that_is_no_text_is_a_problem(client):
+    answer = client.post("/v1/memory/calibrate", content=b"\xff\xfe{", headers={"content-type": "application/json"})
+    assert (answer.status_code, answer.json()["field"]) == (422, "body")
+
+
+def test_what_has_an_end_is_ended_while_the_service_runs(settings, backbone, look, parts, monkeypatch):
+    monkeypatch.setattr(service.app, "PRUNE_EVERY_S", 0.02)
+    with TestClient(create_app(settings.model_copy(update={"scan_expiry_h": 1e-6}), backbone=backbone)) as client:
+        client.post("/v1/scans", files=parts(look()))
+        rows = client.app.state.agent.memory._connection.rows
+        for _ in range(200):
+            if rows("SELECT state FROM scans") == [{"state": "expired"}]:
+                return
+            time.sleep(0.02)
+    raise AssertionError("the scan is still open")

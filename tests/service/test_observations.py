@@ -5,6 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 
 @pytest.fixture
@@ -171,3 +172,89 @@ def test_a_view_it_does_not_have(client, seen):
         answer = client.get(f"/v1/observations/{seen['id']}/{name}.png?view=4")
         assert answer.status_code == 404
         assert "views 0 to 3" in answer.json()["detail"]
+
+
+def test_one_view_is_answered_and_says_how_little_that_is(client, look, parts, seen):
+    one = client.post("/v1/observations", files=parts(look().select([2])), params={"learn": False}).json()["grounds"]
+    assert (one["views"], one["shown"], one["with_depth"]) == (1, 1, 1)
+    assert "one view" in one["weakness"]
+    assert seen["grounds"]["weakness"] is None
+    assert seen["grounds"]["spread_deg"] > 60
+
+
+def test_a_view_s_box_is_around_the_object(look, seen):
+    for box, view in zip(seen["pose"]["boxes_px"], look("bright", views=4).views, strict=True):
+        rows, columns = np.nonzero(view.depth_m > 0)
+        left, top, right, bottom = box
+        middle_x, middle_y = columns.mean(), rows.mean()
+        assert left < middle_x < right
+        assert top < middle_y < bottom
+        assert right - left < 2 * np.ptp(columns)
+        assert bottom - top < 2 * np.ptp(rows)
+
+
+def test_no_more_alternatives_than_asked(client, look, parts, seen):
+    options = {"category_id": seen["category_id"], "variant": "best", "learn": False}
+    counts = [
+        len(client.post("/v1/observations", files=parts(look()), params=options | {"alternatives": count}).json()["pose"]["alternatives"])
+        for count in (0, 1)
+    ]
+    assert counts[0] == 0
+    assert counts[1] <= 1
+
+
+def test_nine_dimensions_are_answered_where_asked_for(client, look, parts, seen):
+    options = {"category_id": seen["category_id"], "learn": False}
+    answer = client.post("/v1/observations", files=parts(look()), params=options | {"dof": 9})
+    assert answer.status_code == 201, answer.text
+    nine = answer.json()["pose"]
+    assert (nine["target_from_object"] is None) == (nine["not_9d_because"] is not None)
+    if nine["target_from_object"]:
+        assert np.allclose(nine["target_from_object"]["scales"], 1, atol=0.1)
+    assert seen["pose"]["target_from_object"] is None
+
+
+@pytest.mark.parametrize(("name", "value"), [("dof", 8), ("method", "guess"), ("estimator", "guess"), ("dims", 0), ("alternatives", -1)])
+def test_a_wrong_option_is_told(client, look, parts, name, value):
+    answer = client.post("/v1/observations", files=parts(look()), params={name: value})
+    assert (answer.status_code, answer.json()["field"]) == (422, name)
+
+
+def test_the_history_is_paged_and_filtered(client, look, parts, seen):
+    older = client.post("/v1/observations", files=parts(look("dark"))).json()
+    newest = client.post("/v1/observations", files=parts(look("dark"))).json()
+
+    def ids(**options):
+        return [each["id"] for each in client.get("/v1/observations", params=options).json()["observations"]]
+
+    assert ids(limit=1) == [newest["id"]]
+    assert ids(limit=1, before=newest["id"]) == [older["id"]]
+    assert ids(category_id=seen["category_id"]) == [seen["id"]]
+    assert ids(outcome="known") == [seen["id"]]
+    assert client.get("/v1/observations", params={"before": "nope"}).status_code == 404
+
+
+def test_a_known_object_in_the_shape_of_vision_msgs(client, seen):
+    array = client.get(f"/v1/observations/{seen['id']}", params={"format": "vision_msgs"}).json()
+    assert set(array) == {"header", "detections"}
+    assert set(array["header"]) == {"stamp", "frame_id"}
+    assert set(array["header"]["stamp"]) == {"sec", "nanosec"}
+    (detection,) = array["detections"]
+    assert set(detection) == {"header", "results", "bbox", "id"}
+    (result,) = detection["results"]
+    assert set(result) == {"hypothesis", "pose"}
+    assert set(result["hypothesis"]) == {"class_id", "score"}
+    assert result["hypothesis"]["class_id"] == seen["category_id"]
+    assert set(result["pose"]) == {"pose", "covariance"}
+    assert len(result["pose"]["covariance"]) == 36
+    assert set(detection["bbox"]) == {"center", "size"}
+    placed = np.array(seen["pose"]["world_from_object"])
+    position, orientation = (result["pose"]["pose"][name] for name in ("position", "orientation"))
+    assert [position[axis] for axis in "xyz"] == pytest.approx(placed[:3, 3])
+    assert np.allclose(Rotation.from_quat([orientation[axis] for axis in "xyzw"]).as_matrix(), placed[:3, :3])
+    assert [detection["bbox"]["size"][axis] for axis in "xyz"] == pytest.approx(seen["pose"]["box"]["extent_m"])
+
+
+def test_a_novel_object_is_no_detection(client, look, parts):
+    array = client.post("/v1/observations", files=parts(look()), params={"format": "vision_msgs"}).json()
+    assert array["detections"] == []
