@@ -70,6 +70,7 @@ class ObserveOptions:
     seed: int = 0
 
 
+WITHOUT_DEPTH = "pnp"
 _PoseOrReason = tuple[PoseEstimate | None, Pose | None, str | None]
 """What was estimated and what is kept of it; or why there is nothing."""
 
@@ -97,7 +98,7 @@ class Agent:
         Raises NotFound for an unknown category, InvalidInput for an unknown variant, NoObject where nothing is seen.
         """
         options = options or ObserveOptions()
-        estimator = PoseEstimator(self._pose_config(options))
+        estimator = PoseEstimator(self._pose_config(options, burst))
         if options.category_id is not None:
             self.memory.categories.get(options.category_id)
         clock = StageClock()
@@ -143,8 +144,10 @@ class Agent:
         """The encoded burst of an observation. Raises NotFound."""
         return burst_from_arrays(self.memory.observations.features(observation_id))
 
-    def _pose_config(self, options: ObserveOptions) -> PoseConfig:
-        config = PoseConfig.named(options.variant or self.config.variant, options.pose)
+    def _pose_config(self, options: ObserveOptions, burst: Burst) -> PoseConfig:
+        """What the caller says; of several views without depth, where nothing was said, the variant that needs none."""
+        without_depth = len(burst) > 1 and all(view.depth_m is None for view in burst.views) and options.pose == PoseOptions()
+        config = PoseConfig.named(options.variant or (WITHOUT_DEPTH if without_depth else self.config.variant), options.pose)
         if options.alternatives is None:
             return config
         return replace(config, best=replace(config.best, alternatives=options.alternatives))

@@ -8,7 +8,7 @@ from collections import deque
 from collections.abc import AsyncIterator, Callable, Mapping
 from dataclasses import dataclass
 from datetime import datetime, timezone
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
 Kind = Literal[
     "observation",
@@ -26,9 +26,9 @@ Kind = Literal[
     "goal_deleted",
     "memory_calibrated",
     "memory_imported",
+    "change_undone",
     "dropped",
 ]
-KINDS: tuple[Kind, ...] = get_args(Kind)
 HISTORY = 256
 """Events kept for a listener that comes back."""
 BACKLOG = 64

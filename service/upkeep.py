@@ -15,6 +15,7 @@ from service.judgement import CALIBRATED_BY
 from store.backup import Backup
 from store.imports import Import
 from store.memory import Memory
+from store.records import AuditEntry
 
 RATE = "false_known_rate"
 """Setting of the memory."""
@@ -85,3 +86,9 @@ class Upkeep:
             brought = self._memory.import_archive(path, actor=actor)
         self._events.publish("memory_imported", ids=[category.id for category in brought.categories])
         return brought
+
+    def undo(self, entry_id: str, *, actor: str | None = None) -> AuditEntry:
+        """Takes back a change of the audit trail. Raises NotFound, and Conflict where it cannot be undone (any more)."""
+        undone = self._memory.undo(entry_id, actor=actor)
+        self._events.publish("change_undone", id=entry_id, category_id=undone.category_id)
+        return undone

@@ -16,7 +16,7 @@ from service.agent import Agent
 from service.deps import ActorDep, AgentDep, WorkDep, media_type
 from service.exchange import MemoryRoute
 from service.metrics import Metrics
-from service.schemas.memory import Backup, Calibrate, ExportQuery, Import, MemoryInfo, Thresholds
+from service.schemas.memory import AuditEntry, AuditList, Backup, Calibrate, ExportQuery, Import, MemoryInfo, Thresholds
 from service.schemas.problem import problems
 from service.settings import Settings
 
@@ -73,6 +73,18 @@ async def import_memory(request: Request, agent: AgentDep, work: WorkDep, actor:
     return await work.run(lambda: _import(agent, body, actor))
 
 
+@router.get("/v1/memory/audit", responses=problems(422))
+def list_changes(agent: AgentDep, limit: Annotated[int, Query(ge=1, le=1000, description="Most to list.")] = 50) -> AuditList:
+    """The latest changes of what was learnt, newest first: who, what, when, and how it was before and after."""
+    return AuditList(entries=[AuditEntry.of(entry) for entry in agent.memory.audit.latest(limit)])
+
+
+@router.post("/v1/memory/audit/{entry_id}/undo", responses=problems(404, 409, 422, 503))
+def undo_change(entry_id: str, agent: AgentDep, actor: ActorDep = None) -> AuditEntry:
+    """Takes back a rename, merge, split or deletion; answers the entry that says so."""
+    return AuditEntry.of(agent.upkeep.undo(entry_id, actor=actor))
+
+
 @live.get("/v1/events", response_class=EventSourceResponse, responses=problems(422))
 async def events(
     agent: AgentDep,
@@ -102,7 +114,12 @@ def imported(agent: Agent, entry_id: str) -> Import:
     return Import.of(agent, entry_id, after["categories"], after["duplicates"])
 
 
-MADE = {"/v1/memory/import": imported}
+def change(agent: Agent, entry_id: str) -> AuditEntry:
+    """One of the audit trail, as JSON."""
+    return AuditEntry.of(agent.memory.audit.get(entry_id))
+
+
+MADE = {"/v1/memory/import": imported, "/v1/memory/audit/{entry_id}/undo": change}
 """What a repeated request is answered with where its first answer was lost."""
 
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from service import upkeep
 from service.agent import Agent
 from service.schemas.categories import Category
-from store import backup
+from store import backup, records
 
 
 class MemoryInfo(BaseModel):
@@ -115,3 +116,28 @@ class Import(BaseModel):
             duplicates=[Category.of(known[each]) for each in duplicate_ids if each in known],
             same_name=sorted({category.name for category in new if category.name is not None and names.count(category.name) > 1}),
         )
+
+
+class AuditEntry(BaseModel):
+    """One change of what was learnt."""
+
+    id: str
+    created_at: str = Field(description="ISO 8601, UTC.", examples=["2026-01-31T12:00:00.000+00:00"])
+    actor: str | None = Field(description="Who asked for it, as X-Actor said.")
+    action: records.Action
+    category_id: str | None = Field(description="The category that was changed.")
+    before: dict[str, Any] = Field(description="How it was, as far as it changed.")
+    after: dict[str, Any] = Field(description="How it was then.")
+    undone_by: str | None = Field(description="The entry that undid it.")
+    undoable: bool = Field(description="Whether it can still be undone.")
+
+    @staticmethod
+    def of(entry: records.AuditEntry) -> AuditEntry:
+        """From the memory's record."""
+        return AuditEntry(**{name: getattr(entry, name) for name in AuditEntry.model_fields})
+
+
+class AuditList(BaseModel):
+    """The latest changes, newest first."""
+
+    entries: list[AuditEntry]

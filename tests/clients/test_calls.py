@@ -31,6 +31,8 @@ ELSEWHERE = {
     ("GET", "/readyz"): "for whoever watches the process",
     ("GET", "/metrics"): "for whoever watches the process",
     ("GET", "/v1/events"): "a stream: a method of its own",
+    ("GET", "/v1/memory/audit"): "for whoever keeps the memory",
+    ("POST", "/v1/memory/audit/{entry_id}/undo"): "for whoever keeps the memory",
 }
 """Endpoints that are no call."""
 STREAMS = {"events", "track"}

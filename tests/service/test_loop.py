@@ -81,6 +81,15 @@ def test_photographs_without_depth_and_cameras_are_recognised_without_a_pose(cli
     assert "K" in seen["pose_error"]
 
 
+def test_cameras_without_depth_are_enough_for_a_pose(client, look, parts, learn):
+    category = learn()
+    burst = parts(look("bright", world_from_object=PLACED), lambda about, files: files["depth"].clear())
+    seen = client.post("/v1/observations", files=burst, params={"category_id": category["id"]}).json()
+    assert seen["pose"] is not None, seen["pose_error"]
+    found = Sim3.from_matrix(np.array(seen["pose"]["target_from_reference"]["matrix"]))
+    assert rotation_angle_deg(found.rotation, PLACED.rotation) < 10
+
+
 def test_a_novel_photograph_has_no_scan_and_says_why(client, look, parts):
     def colour_only(about, files):
         del about["views"]

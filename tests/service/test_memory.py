@@ -141,3 +141,18 @@ def test_a_threshold_that_is_set_is_not_made_of_a_rate(settings, backbone, setti
 def test_a_rate_is_a_share(client, rate):
     answer = client.post("/v1/memory/calibrate", json={"false_known_rate": rate})
     assert (answer.status_code, answer.json()["field"]) == (422, "false_known_rate")
+
+
+def test_changes_are_told_with_who_made_them_and_can_be_taken_back(client, learn):
+    path = f"/v1/categories/{learn('bright', 'ball')['id']}"
+    client.patch(path, json={"name": "stone"}, headers={"X-Actor": "kim"})
+    client.delete(path, headers={"X-Actor": "kim"})
+    deleted, renamed, created = client.get("/v1/memory/audit").json()["entries"]
+    assert [entry["action"] for entry in (deleted, renamed, created)] == ["delete", "rename", "create"]
+    assert (renamed["actor"], renamed["before"], renamed["after"]) == ("kim", {"name": "ball"}, {"name": "stone"})
+    undone = client.post(f"/v1/memory/audit/{deleted['id']}/undo")
+    assert (undone.status_code, undone.json()["action"]) == (200, "undo")
+    assert client.get(path).json()["name"] == "stone"
+    assert client.post(f"/v1/memory/audit/{deleted['id']}/undo").status_code == 409
+    assert client.post(f"/v1/memory/audit/{created['id']}/undo").status_code == 409
+    assert client.post("/v1/memory/audit/nope/undo").status_code == 404

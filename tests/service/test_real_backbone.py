@@ -127,6 +127,8 @@ def test_every_endpoint_answers(http, called, parts, scanned, category, seen):
     for probe in ("/healthz", "/readyz", "/metrics"):
         http.get(probe)
     http.patch(path, json={"name": "screen"})
+    http.post(f"/v1/memory/audit/{http.get('/v1/memory/audit').json()['entries'][0]['id']}/undo")
+    assert http.get(path).json()["name"] == "tv"
     scan = http.post("/v1/scans", json={"observation_id": seen["id"]}, params={"viewpoints": 20}).json()
     http.post(f"/v1/scans/{scan['id']}/exclude", json={"viewpoints": [0]})
     assert len(http.get(f"/v1/scans/{scan['id']}").json()["world_from_camera"]) == 20

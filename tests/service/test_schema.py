@@ -51,8 +51,15 @@ def url(serving: Any, tmp_path_factory: Any, look: Any, parts: Any, colour_backb
         goal = client.post(f"/v1/categories/{category['id']}/goals", json={"observation_id": known["id"]}).json()
         scan = client.post("/v1/scans", json={"observation_id": seen["id"]}).json()
         instance = client.get(f"/v1/categories/{category['id']}/instances").json()["instances"][1]
+        client.patch(f"/v1/categories/{category['id']}", json={"name": "ball"})
+        entry = client.get("/v1/memory/audit").json()["entries"][0]
         real.update(
-            category_id=category["id"], observation_id=known["id"], goal_id=goal["id"], scan_id=scan["id"], instance_id=instance["id"]
+            entry_id=entry["id"],
+            category_id=category["id"],
+            observation_id=known["id"],
+            goal_id=goal["id"],
+            scan_id=scan["id"],
+            instance_id=instance["id"],
         )
         yield address
 
