@@ -78,7 +78,7 @@ class Instances:
         return [Member(row["category_id"], *found) for row in rows if (found := tokens.get(row["id"])) is not None]
 
     def reload(self) -> None:
-        """Reads all tokens anew: another backbone computed them."""
+        """Reads all tokens anew: they were computed again."""
         self._tokens = {}
 
     def _load(self, wanted: set[str]) -> dict[str, Tokens | None]:

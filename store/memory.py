@@ -175,7 +175,10 @@ class Memory:
         `progress` counts categories. Raises InvalidInput where the archive is not in order, Conflict where it was made with another
         backbone, Unavailable where it cannot be read or kept.
         """
-        return import_archive(self._connection, path, self.categories.all(), actor=actor, progress=progress)
+        result = import_archive(self._connection, path, self.categories.all(), actor=actor, progress=progress)
+        seal(self._connection)  # an earlier version may have written it
+        self.instances.reload()
+        return result
 
     def reembed(self, backbone: Backbone, features: Features, *, actor: str | None = None, progress: Progress | None = None) -> Reembedded:
         """Computes everything anew from the kept views, with another backbone or again with the same, and then ties the memory to it.

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from core.errors import Unavailable
+from core.packing import burst_from_arrays
+from store.arrays import arrays_file, read_arrays
 from store.columns import files_from_json, files_to_json
 from store.connection import Connection
 from store.folders import remove_orphans, sums
+from store.instances import damaged, token_columns
 from store.retention import ago, ahead
 
 FOLDERS = {
@@ -16,7 +20,7 @@ FOLDERS = {
 
 
 def seal(connection: Connection) -> None:
-    """Completes rows that an earlier version wrote: checksums of their files, and when a scan ends."""
+    """Completes rows that an earlier version wrote: checksums of their files, patch tokens, and when a scan ends."""
     for table, query in FOLDERS.items():
         for row in connection.rows(f"{query} WHERE files IS NULL"):
             folder = connection.root / row["folder"]
@@ -25,6 +29,23 @@ def seal(connection: Connection) -> None:
                 db.execute(f"UPDATE {table} SET files = ? WHERE id = ?", [files, row["id"]])
     with connection.housekeeping() as db:
         db.execute("UPDATE scans SET expires_at = ? WHERE expires_at IS NULL", [ahead(connection.retention.scans)])
+    for folder in connection.rows("SELECT DISTINCT pictures FROM instances WHERE patches IS NULL AND pictures IS NOT NULL"):
+        _complete_tokens(connection, folder["pictures"])
+
+
+def _complete_tokens(connection: Connection, pictures: str) -> None:
+    """Draws the patch tokens of the instances that a folder shows from its arrays, where these are those of the instances."""
+    table, _, row_id = pictures.partition("/")
+    (row,) = connection.rows(f"SELECT files FROM {table} WHERE id = ?", row_id)
+    try:
+        name, file = arrays_file(files_from_json(row["files"]))
+        columns = token_columns(burst_from_arrays(read_arrays(connection.root / pictures / name, file.sha256)))
+    except (Unavailable, LookupError, StopIteration):  # damaged, or no arrays of a burst: such an instance stays as it is
+        return
+    with connection.housekeeping() as db:
+        for instance in list(db.query("SELECT * FROM instances WHERE patches IS NULL AND pictures = ?", [pictures])):
+            if not damaged(instance) and instance["cls"] == columns["cls"]:
+                db.table("instances").update(instance["id"], columns)
 
 
 def purge(connection: Connection) -> None:

@@ -16,6 +16,7 @@ import pytest
 
 from core.encode import EncodedBurst
 from core.errors import Conflict, InvalidInput, NotFound, Unavailable
+from core.evidence import sample_patches
 from core.novelty import SCORES, DecisionConfig, decide
 from core.reference import Reference
 from core.sim3 import Sim3
@@ -347,6 +348,23 @@ def test_tokens_must_be_numbers_of_the_reference_s_size(second: Memory, archive:
         with pytest.raises(InvalidInput, match="cannot be read"):
             second.import_archive(packed(tmp_path / "evil.zip", with_manifest(evil, tell)))
     assert nothing_changed(second)
+
+
+def test_an_archive_of_an_earlier_version_brings_what_decisions_compare_now(
+    second: Memory, archive: Path, category: Category, encoded: EncodedBurst, tmp_path: Path
+) -> None:
+    entries = unpacked(archive)
+    name = f"tokens/{category.id}.npz"
+    tokens = dict(np.load(io.BytesIO(entries[name])))
+    del tokens["000000_patches"]
+    blobs = bytes(tokens["000000_cls"]) + bytes(tokens["000000_pooled"])
+
+    def tell(manifest: dict) -> None:
+        manifest["categories"][0]["instances"][0]["tokens_sha256"] = FileSum.of(blobs).sha256
+
+    second.import_archive(packed(tmp_path / "earlier.zip", with_manifest(with_entry(entries, name, npz(**tokens)), tell)))
+    assert np.array_equal(second.categories.members()[0].patches, sample_patches(encoded))
+    assert second.check().ok
 
 
 def changes() -> dict[str, Callable[[dict], object]]:

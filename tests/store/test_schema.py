@@ -12,6 +12,7 @@ from sqlite_utils import Database
 
 from core.encode import EncodedBurst
 from core.errors import Conflict
+from core.evidence import sample_patches
 from core.reference import Reference
 from core.views import Burst
 from store.columns import files_from_json
@@ -51,6 +52,13 @@ def test_what_was_learnt_is_still_known(upgraded: Memory, cup: Category, referen
     for member in upgraded.categories.members():
         assert np.array_equal(member.cls, encoded.cls)
         assert np.array_equal(member.pooled, encoded.pooled)
+
+
+def test_tokens_that_decisions_compare_now_are_drawn_from_its_arrays(upgraded: Memory, encoded: EncodedBurst) -> None:
+    by_scan, by_observation = upgraded.categories.members()
+    assert np.array_equal(by_scan.patches, sample_patches(encoded))
+    assert by_observation.patches is None  # its features were no burst's
+    assert upgraded.check().ok
 
 
 def test_provenance_is_what_can_be_told(upgraded: Memory, cup: Category) -> None:
