@@ -11,7 +11,7 @@ import typer
 from rich.markup import escape
 from typer.core import TyperGroup
 
-from clients.cli import bench, categories, data, demo, doctor, memory, render, robot, service
+from clients.cli import bench, categories, data, demo, doctor, memory, rearrange, render, robot, service
 from clients.cli.terminal import errors
 from core.errors import OneLookError
 
@@ -55,6 +55,7 @@ app.command("scan")(robot.scan)
 app.add_typer(categories.app, name="categories")
 app.add_typer(memory.app, name="memory")
 app.command("simulate")(demo.simulate)
+app.command("rearrange")(rearrange.rearrange)
 app.command("render")(render.render)
 app.command("samples")(data.samples)
 app.command("convert")(data.convert)

@@ -1,0 +1,69 @@
+"""`onelook rearrange`: the paper's rearrangement experiment in the simulated world."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from clients.cli.demo import Out, ServiceUrl, service
+from clients.cli.terminal import Json, console, errors, print_facts, print_json
+
+CATEGORIES = ["mug", "teapot", "car", "camera", "chair", "duck", "house", "locomotive", "clock", "laptop"]
+"""Without those that are alike from several sides."""
+
+
+def rearrange(
+    out: Out = Path("out/rearrange"),
+    trials: Annotated[int, typer.Option(min=1, help="Objects to be brought to the goal of their category.")] = 50,
+    category: Annotated[list[str] | None, typer.Option(help="Category of the simulator; may be repeated; ten where left out.")] = None,
+    views: Annotated[int, typer.Option(min=2, help="Views in each burst.")] = 8,
+    seed: Annotated[int, typer.Option(help="Of objects, poses, rooms and faults.")] = 0,
+    url: ServiceUrl = None,
+    json: Json = False,
+) -> None:
+    """Show a reference at a goal, bring other objects of its category there, and measure how they end."""
+    from clients.robot import RobotClient
+    from clients.simulator.raycast.export import draw_models
+    from clients.simulator.rearrange import Rearrangement, summarise, write_json, write_picture
+
+    categories = category or CATEGORIES
+    draw_models(categories, 1, seed)  # says at once which category there is none of
+    out.mkdir(parents=True, exist_ok=True)
+    screen = errors if json else console
+    with service(url, out) as address, RobotClient(address) as robot:
+        started = time.perf_counter()
+        batch = Rearrangement(robot, categories, trials, views, seed)
+        done = []
+        with screen.status(f"1 of {trials}") as status:
+            for trial in batch:
+                done.append(trial)
+                how = trial.failure or f"{trial.rotation_deg:.1f}° and {100 * (trial.position_m or 0):.1f} cm off"
+                screen.print(f"{trial.number:>3}  {trial.name:<24} {how}", highlight=False)
+                status.update(f"{len(done) + 1} of {trials}")
+        summary = summarise(done, time.perf_counter() - started)
+    settings: dict[str, object] = {"categories": categories, "trials": trials, "views": views, "seed": seed}
+    write_json(done, summary, settings, out / "rearrange.json")
+    if batch.pictures:
+        write_picture(batch.pictures, out / "rearrange.png")
+    if json:
+        print_json(asdict(summary))
+        return
+    print_facts(
+        {
+            "brought to the goal": f"{summary.moved} of {summary.trials}; {summary.recognised} recognised",
+            "within 30° and 5 cm": f"{summary.success:.0f} % of all",
+            "Acc30, Acc15, Acc7.5": f"{summary.acc30:.0f} %, {summary.acc15:.0f} %, {summary.acc7_5:.0f} % of all",
+            "rotation": f"{_or_none(summary.median_deg, 1)}° median, {summary.start_median_deg:.0f}° before",
+            "position of the base": f"{_or_none(summary.median_m, 100)} cm median, {100 * summary.start_median_m:.0f} cm before",
+            "time": f"{summary.total_s:.0f} s",
+            "written": f"{out / 'rearrange.json'}, {out / 'rearrange.png'}",
+        }
+    )
+
+
+def _or_none(value: float | None, factor: float) -> str:
+    return "none" if value is None else f"{factor * value:.1f}"
