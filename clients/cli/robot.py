@@ -131,6 +131,10 @@ def _facts(seen: Observation) -> dict[str, object]:
         facts["similarity"] = f"{seen.similarities[0].similarity:.3f}{limit}"
     if seen.probability is not None:
         facts["probability"] = f"{seen.probability:.2f} that it is of the most similar category"
+    if seen.candidates:
+        facts["candidates"] = ", ".join(seen.candidates)
+    if seen.viewpoints is not None and len(seen.viewpoints):
+        facts["look from"] = ", ".join(f"{value:.2f}" for value in seen.viewpoints[0][:3, 3]) + " m, in the burst's world frame, next"
     if seen.pose is not None:
         facts["scale"] = f"{seen.pose.scale:.3f} of the reference"
         facts["centre"] = ", ".join(f"{value:.3f}" for value in seen.pose.object_in_world[:3, 3]) + " m in the burst's world frame"

@@ -7,14 +7,17 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 from typer.main import get_command
 from typer.testing import CliRunner, Result
 
 import service.app
 from clients.cli import app
+from clients.cli.robot import _facts
 from clients.datasets import samples as shipped
 from clients.datasets.folders import Sequence
 from clients.errors import Unreachable
@@ -161,3 +164,20 @@ def test_brackets_of_an_error_are_printed(monkeypatch: pytest.MonkeyPatch) -> No
 
     monkeypatch.setattr("clients.datasets.sources.find_sequences", refuse)
     assert onelook("observe", "x").output == "error: views[3].depth: install 'onelook[server]'\n"
+
+
+def test_an_uncertain_answer_says_where_to_look_next() -> None:
+    pose = np.eye(4)
+    pose[:3, 3] = [0.5, -0.25, 1]
+    seen = SimpleNamespace(
+        **dict.fromkeys(("category_id", "name", "probability", "pose", "scan", "pose_error", "scan_error")),
+        outcome="uncertain",
+        similarities=(),
+        candidates=("cup", "bowl"),
+        viewpoints=pose[None],
+        id="o",
+        timings_ms={"total": 7.0},
+    )
+    facts = _facts(seen)
+    assert facts["candidates"] == "cup, bowl"
+    assert facts["look from"] == "0.50, -0.25, 1.00 m, in the burst's world frame, next"
