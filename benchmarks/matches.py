@@ -1,4 +1,4 @@
-"""Patch matches between every two bursts, with patches centred as a memory of a few bursts, and of many, would centre them.
+"""Patch matches between every two bursts, adapted as a memory of a few bursts, and of many, would adapt them.
 
 Letters: N bursts, S stages.
 """
@@ -18,27 +18,30 @@ from benchmarks.parallel import bar
 from core.backbones.weights import cache_folder
 from core.backbones.whitening import Whitening
 from core.encode import EncodedBurst
-from core.evidence import centre, directions, match_views, sample_patches, whitened
+from core.evidence import Adaptation, match_views, sample_patches, whitened
 
 FloatArray = NDArray[np.floating[Any]]
 STAGES = (0, 8, 32)
-"""Bursts that a memory holds at least for a stage; with fewer than the second it has the shipped centre."""
+"""Bursts that a memory holds at least for a stage; with fewer than the second it has the shipped statistics."""
 
 
 def matches(bursts: Sequence[EncodedBurst], whitening: Whitening | None, folder: Path | None = None) -> FloatArray:
     """Match of bursts i and j, shape (S, N, N), symmetric; kept in the user's cache.
 
-    A stage's centre comes from as many bursts, drawn at random: in an episode they would be those that came first.
+    A stage's statistics come from as many bursts, drawn at random: in an episode they would be those that came first.
     """
     patches = [whitened(sample_patches(burst), whitening) for burst in bursts]
     file = (folder or cache_folder() / "matches") / f"{_key(patches)}.npy"
     if not file.exists():
         file.parent.mkdir(parents=True, exist_ok=True)
         order = np.random.default_rng(0).permutation(len(patches))
-        centres = [centre([patches[index] for index in order[:count]]) if count else np.zeros(patches[0].shape[-1]) for count in STAGES]
+        adaptations = [
+            Adaptation.fit([patches[index] for index in order[:count]]) if count else Adaptation.none(patches[0].shape[-1])
+            for count in STAGES
+        ]
         with bar() as progress:
-            task = progress.add_task("matching patches", total=len(centres) * len(patches))
-            table = np.stack([_table(patches, middle, lambda: progress.advance(task)) for middle in centres])
+            task = progress.add_task("matching patches", total=len(adaptations) * len(patches))
+            table = np.stack([_table(patches, each, lambda: progress.advance(task)) for each in adaptations])
         partial = file.with_suffix(".partial")
         with partial.open("wb") as stream:
             np.save(stream, table)
@@ -46,8 +49,8 @@ def matches(bursts: Sequence[EncodedBurst], whitening: Whitening | None, folder:
     return np.asarray(np.load(file))
 
 
-def _table(patches: list[FloatArray], middle: FloatArray, advance: Callable[[], None]) -> FloatArray:
-    unit = [directions(each, middle) for each in patches]
+def _table(patches: list[FloatArray], adaptation: Adaptation, advance: Callable[[], None]) -> FloatArray:
+    unit = [adaptation.directions(each) for each in patches]
     table = np.zeros((len(unit), len(unit)))
     for row, each in enumerate(unit):
         table[row, row:] = table[row:, row] = match_views(each, unit[row:])

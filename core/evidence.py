@@ -1,7 +1,7 @@
 """Our similarity of a burst to a category (`best`): whitened patches matched view by view, less what both resemble anyway.
 
 Three things beyond the paper's cosines of [CLS]:
-- patches of the block that serves correspondences, whitened, and centred on what this memory sees on average;
+- patches of the block that serves correspondences, whitened by what ships and then by what this memory has seen;
 - every view counts by the other side's view it matches best, since opposite sides of one object look unalike;
 - from a match is taken what burst and member reach with other categories: some objects resemble everything (hubs), and a burst of many
   views finds a good match for each of them. What is left does not grow with the number of views.
@@ -32,8 +32,12 @@ COHORT = 5
 """Other categories that tell how well a burst matches anything: the most similar ones."""
 SHORTLIST = 5
 """Categories, the best matching first, whose evidence is computed."""
-CENTRE_PRIOR = 4.0
-"""Bursts for which the shipped mean counts when the memory's own bursts move it."""
+ADAPTATION_PRIOR = 4.0
+"""Bursts for which the shipped mean counts when the memory's own moves it."""
+COVARIANCE_PRIOR = 32.0
+"""The same of the covariance: of few objects it would be the differences between just these, and take them out."""
+ADAPTED = 4
+"""Every so many-th patch takes part in the statistics: there are thousands, alike within a view."""
 BATCH = 16
 """Bursts matched at once: about 40 MB."""
 MOST_MEMBERS = 256
@@ -52,18 +56,40 @@ def whitened(patches: FloatArray, whitening: Whitening | None) -> FloatArray:
     return patches.astype(np.float32) if whitening is None else whitening.apply(patches.astype(np.float32))
 
 
-def centre(members: Sequence[FloatArray]) -> FloatArray:
-    """What these bursts' whitened patches, each (V, K, D), have in common, shape (D,).
+@dataclass(frozen=True, eq=False)
+class Adaptation:
+    """An affine map that takes out what the objects of one memory have in common: its cameras, its light, its kind of place."""
 
-    It is shrunk towards the shipped mean, which is zero once whitened.
-    """
-    means = np.stack([member.reshape(-1, member.shape[-1]).mean(axis=0, dtype=np.float64) for member in members])
-    return np.asarray(means.sum(axis=0) / (len(members) + CENTRE_PRIOR))
+    mean: FloatArray
+    """Shape (D,)."""
+    matrix: FloatArray
+    """Shape (D, D)."""
 
+    @staticmethod
+    def fit(members: Sequence[FloatArray]) -> Adaptation:
+        """From the whitened patches of bursts, each (V, K, D), without any label.
 
-def directions(patches: FloatArray, middle: FloatArray) -> Tensor:
-    """Unit patches about a centre, shape (V, K, D)."""
-    return torch.nn.functional.normalize(torch.from_numpy(patches - middle).float(), dim=-1)
+        Few bursts say little of D² covariances: mean and covariance are shrunk towards those that ship, which are zero and isotropic here.
+        """
+        drawn = [member[:, ::ADAPTED].reshape(-1, member.shape[-1]).astype(np.float64) for member in members]
+        count = len(drawn)
+        mean = np.mean([each.mean(axis=0) for each in drawn], axis=0)
+        centred = np.concatenate(drawn) - mean
+        covariance = centred.T @ centred / len(centred)
+        variance = float(np.trace(covariance)) / len(mean)
+        covariance = (count * covariance + COVARIANCE_PRIOR * variance * np.eye(len(mean))) / (count + COVARIANCE_PRIOR)
+        variances, vectors = np.linalg.eigh(covariance)
+        scaled = vectors / np.sqrt(variances.clip(0) + max(variance, 1e-12))
+        return Adaptation(count * mean / (count + ADAPTATION_PRIOR), scaled @ vectors.T)
+
+    @staticmethod
+    def none(size: int) -> Adaptation:
+        """Of a memory that holds nothing, for tokens of this size D."""
+        return Adaptation(np.zeros(size), np.eye(size))
+
+    def directions(self, patches: FloatArray) -> Tensor:
+        """Unit patches, shape (V, K, D), of whitened ones."""
+        return torch.nn.functional.normalize(torch.from_numpy((patches - self.mean) @ self.matrix).float(), dim=-1)
 
 
 def match_views(target: Tensor, others: Sequence[Tensor]) -> FloatArray:
@@ -119,14 +145,14 @@ class Entry:
 
     category_id: str
     patches: Tensor
-    """Unit patches about the memory's centre, shape (V, K, D)."""
+    """Unit patches, adapted to the memory, shape (V, K, D)."""
 
 
 class Comparison:
     """One burst against a memory. A category's first member, its founder, represents it to others."""
 
     def __init__(self, entries: Sequence[Entry], target: Tensor, cohort_prior: float) -> None:
-        """`target`: unit patches about the same centre, shape (V, K, D)."""
+        """`target`: unit patches, adapted to the same memory, shape (V, K, D)."""
         self._entries, self._prior = entries, cohort_prior
         self._matches = match_views(target, [entry.patches for entry in entries])
         self._of: dict[str, list[int]] = {}

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from core.backbones.whitening import Whitening
 from core.encode import EncodedBurst
 from core.errors import InvalidInput
-from core.evidence import directions, match_views, sample_patches, whitened
+from core.evidence import Adaptation, match_views, sample_patches, whitened
 from core.reference import Reference
 from core.scan import ScanOptions, angles_about_deg, request_scan
 from core.sim3 import Sim3
@@ -70,7 +70,7 @@ def _difference(viewpoints: FloatArray, center_m: FloatArray, candidates: Sequen
             raise InvalidInput("reference", "has a view without camera")
         cameras = np.stack([_moved(view.camera.world_from_camera, candidate.target_from_reference) for view in shown if view.camera])
         patches = whitened(sample_patches(EncodedBurst(tuple(shown), candidate.reference.fingerprint)), whitening)
-        units = directions(patches, np.zeros(patches.shape[-1]))
+        units = Adaptation.none(patches.shape[-1]).directions(patches)
         predicted.append((angles_about_deg(viewpoints, cameras, center_m).argmin(axis=1), units))
     (first, of_first), (second, of_second) = predicted
     pairs = {pair: 1 - float(match_views(of_first[[pair[0]]], [of_second[[pair[1]]]])[0]) for pair in set(zip(first, second))}

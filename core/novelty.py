@@ -17,7 +17,7 @@ from core.calibration import Calibration, Prior
 from core.descriptors import unit
 from core.encode import EncodedBurst
 from core.errors import InvalidInput
-from core.evidence import Comparison, Entry, centre, directions, most_similar_members, sample_patches, whitened
+from core.evidence import Adaptation, Comparison, Entry, most_similar_members, sample_patches, whitened
 
 FloatArray = NDArray[np.floating]
 Outcome = Literal["known", "uncertain", "novel"]
@@ -230,6 +230,6 @@ def _compare(memory: Sequence[Member], target: EncodedBurst, whitening: Whitenin
     patches = [whitened(member.patches, whitening) for member in members if member.patches is not None]
     if not patches:
         return None
-    middle = centre(patches)
-    entries = [Entry(member.category_id, directions(each, middle)) for member, each in zip(members, patches)]
-    return Comparison(entries, directions(whitened(sample_patches(target), whitening), middle), cohort)
+    adaptation = Adaptation.fit(patches)
+    entries = [Entry(member.category_id, adaptation.directions(each)) for member, each in zip(members, patches)]
+    return Comparison(entries, adaptation.directions(whitened(sample_patches(target), whitening)), cohort)

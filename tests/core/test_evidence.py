@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 import torch
 
-from core.evidence import CENTRE_PRIOR, COHORT, Comparison, Entry, centre, cohort_level, directions, match_views, sample_patches
+from core.descriptors import unit
+from core.evidence import ADAPTATION_PRIOR, COHORT, Adaptation, Comparison, Entry, cohort_level, match_views, sample_patches
 from core.sim3 import Sim3
 
 from .conftest import PaintedObject
@@ -41,9 +42,22 @@ def test_the_cohort_is_the_best_of_the_others_and_filled_by_the_prior() -> None:
     assert cohort_level(np.zeros((3, 0)), 0.5).tolist() == [0.5] * 3
 
 
-def test_the_centre_is_shrunk_towards_zero() -> None:
-    bursts = [np.ones((2, 3, 4)), 3 * np.ones((5, 3, 4))]
-    np.testing.assert_allclose(centre(bursts), 4 / (2 + CENTRE_PRIOR))
+def test_the_mean_is_shrunk_towards_what_ships() -> None:
+    rng = np.random.default_rng(0)
+    bursts = [value + rng.normal(scale=1e-3, size=(2, 8, 4)) for value in (1.0, 3.0)]
+    np.testing.assert_allclose(Adaptation.fit(bursts).mean, 4 / (2 + ADAPTATION_PRIOR), atol=0.01)
+
+
+def test_many_bursts_flatten_what_they_have_in_common() -> None:
+    """One direction varies a hundred times as much as the others, alike in all bursts: it is worth less afterwards."""
+    rng = np.random.default_rng(0)
+    spread = np.array([10.0, 1, 1, 1])
+    bursts = [5 + spread * rng.normal(size=(4, 24, 4)) for _ in range(60)]
+    adaptation = Adaptation.fit(bursts)
+    adapted = (np.concatenate(bursts).reshape(-1, 4) - adaptation.mean) @ adaptation.matrix
+    assert adapted.std(axis=0)[0] < 0.7 * spread[0] * adapted.std(axis=0)[1:].max()
+    none = Adaptation.none(4)
+    np.testing.assert_allclose(none.directions(bursts[0]).numpy(), unit(bursts[0]), atol=1e-5)
 
 
 def test_what_resembles_everything_is_no_evidence() -> None:
@@ -66,5 +80,5 @@ def test_patches_are_drawn_the_same_way_every_time_from_views_that_show_somethin
     first, again = sample_patches(burst), sample_patches(burst)
     assert first.shape == (3, 24, 48)
     np.testing.assert_array_equal(first, again)
-    length = torch.linalg.vector_norm(directions(first.astype(np.float32), np.zeros(48)), dim=-1)
+    length = torch.linalg.vector_norm(Adaptation.none(48).directions(first.astype(np.float32)), dim=-1)
     torch.testing.assert_close(length, torch.ones(3, 24))
