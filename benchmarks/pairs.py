@@ -64,10 +64,9 @@ def sample_pairs(sequences: Sequence[folders.Sequence], limit: int, seed: int) -
     return pairs
 
 
-def choose_views(name: str, role: str, available: int, count: int | None, seed: int) -> list[int]:
-    """`count` of the `available` views of sequence `name`, ascending indices; None is all.
-
-    The first of a random order, one for each `role` ("reference" or "target"), so that the views of `10+3` are among those of `10+10`.
+def choose_views(name: str, role: str, available: int, count: int, seed: int) -> list[int]:
+    """`count` of the `available` views of sequence `name`, ascending indices: evenly spaced in the order of recording, as Goodwin 2022
+    samples them, from a random first one for each `role` ("reference" or "target").
     """
-    rng = np.random.default_rng([seed, crc32(name.encode()), crc32(role.encode())])
-    return sorted(rng.permutation(available)[:count].tolist())
+    first = np.random.default_rng([seed, crc32(name.encode()), crc32(role.encode())]).integers(available)
+    return sorted(((np.arange(count) * available // count + first) % available).tolist())

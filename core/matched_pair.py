@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from core.correspond import PairMatches, PatchSet, match
 from core.descriptors import PcaBasis, unit
+from core.discriminant import discriminant_directions
 from core.encode import EncodedBurst, EncodedView
 from core.errors import InvalidInput
 from core.matches import Matches
@@ -23,6 +24,8 @@ from core.views import FloatArray
 
 Pairs = list[tuple[int, int]]
 """(reference view, target view)"""
+STEADY_DIMS = 32
+"""Size of the descriptors that change little from view to view."""
 
 
 class Described(Protocol):
@@ -73,6 +76,7 @@ class MatchedPair:
         self.reference, self.target = (
             [view.trusted_only() if measured else view for view in views] for views, measured in zip((reference.views, target.views), depth)
         )
+        self._basis = reference.basis
         self.descriptors = _describe(self.reference, reference, dims), _describe(self.target, reference, dims)
         sides = [_patches(views, vectors, method) for views, vectors in zip((self.reference, self.target), self.descriptors)]
         self.found: PairMatches = match(sides[0], sides[1], correspondences, method)
@@ -85,6 +89,15 @@ class MatchedPair:
     def clouds(self) -> tuple[FloatArray, FloatArray]:
         """All points of the reference and of the target, each (P, 3)."""
         of_reference, of_target = (np.concatenate([view.points_m for view in views]) for views in (self.reference, self.target))
+        return of_reference, of_target
+
+    @cached_property
+    def steady_descriptors(self) -> tuple[list[FloatArray], list[FloatArray]]:
+        """Unit descriptors that change little from view to view, of each view's patches, of the reference and of the target."""
+        directions = discriminant_directions((self.reference, self.target), STEADY_DIMS)
+        of_reference, of_target = (
+            [unit((view.descriptors - self._basis.mean) @ directions) for view in views] for views in (self.reference, self.target)
+        )
         return of_reference, of_target
 
     def among_all_patches(self, matches: Matches) -> Matches:

@@ -37,13 +37,14 @@ class BestConfig:
     dense: DenseConfig = field(default_factory=DenseConfig)
     polish: DenseConfig = field(default_factory=lambda: DenseConfig(points=1200))
     """For the last refinement, of the winner alone."""
-    view_weight: float = 0.25
-    """Weight of the agreement of view pairs beside the log of the dense score."""
+    view_weight: float = 0.05
+    """Weight, for each target view, of the agreement of view pairs beside the log of the dense score: every view is further evidence."""
+    most_view_weight: float = 0.5
     view_deg: float = 40.0
     """Angle over which a view pair speaks for a rotation."""
-    refined: int = 12
+    refined: int = 24
     """Hypotheses that are refined: the best of those that differ in rotation."""
-    distinct_deg: float = 12.0
+    distinct_deg: float = 10.0
     alternative_deg: float = 30.0
     """An alternative differs by at least this from better ones."""
     alternatives: int = 3
@@ -181,7 +182,7 @@ class PoseEstimator:
         """9-D where that is determined, else 7-D as it was."""
         try:
             if self.config.solver == "agreement":
-                agreement = DenseAgreement(pair.reference, pair.target, pair.descriptors, self.config.best.polish, seed)
+                agreement = DenseAgreement(pair.reference, pair.target, pair.steady_descriptors, self.config.best.polish, seed)
                 transform = agreement.stretch(estimate.target_from_reference, world_from_object)
             else:
                 transform = axis_scales(estimate, pair, world_from_object, threshold_m)
@@ -199,13 +200,14 @@ class PoseEstimator:
         agreement = DenseAgreement(pair.reference, pair.target, pair.descriptors, config.dense, seed)
         promising = distinct(guesses, agreement.score(guesses), config.distinct_deg, config.refined)
         clock.lap("score")
-        refined = agreement.refine(guesses.select(promising))
-        scores = agreement.score(refined)
+        steady = DenseAgreement(pair.reference, pair.target, pair.steady_descriptors, config.dense, seed)
+        refined = steady.refine(guesses.select(promising))
         views = view_agreement(refined.rotation.numpy(), pair.relative, pair.similarity, config.view_deg)
-        scores = scores * torch.from_numpy(np.exp(config.view_weight * views))
+        weight = min(config.view_weight * len(pair.target), config.most_view_weight)
+        scores = agreement.score(refined) * torch.from_numpy(np.exp(weight * views))
         ranked = distinct(refined, scores, config.alternative_deg, 1 + config.alternatives)
         clock.lap("refine")
-        polish = DenseAgreement(pair.reference, pair.target, pair.descriptors, config.polish, seed)
+        polish = DenseAgreement(pair.reference, pair.target, pair.steady_descriptors, config.polish, seed)
         transform = polish.refine(refined.select(ranked[:1]))[0]
         clock.lap("polish")
         pairs = pair.best_pairs()
