@@ -64,9 +64,12 @@ def sample_pairs(sequences: Sequence[folders.Sequence], limit: int, seed: int) -
     return pairs
 
 
-def choose_views(name: str, role: str, available: int, count: int, seed: int) -> list[int]:
-    """`count` of the `available` views of sequence `name`, ascending indices: evenly spaced in the order of recording, as Goodwin 2022
-    samples them, from a random first one for each `role` ("reference" or "target").
+def choose_views(name: str, role: str, available: int, count: int | None, seed: int) -> list[int]:
+    """`count` of the `available` views of sequence `name`, ascending indices; None is all.
+
+    Evenly spaced in the order of recording, as Goodwin 2022 samples them, from a random first one for each `role` ("reference" or
+    "target").
     """
+    chosen = available if count is None else count
     first = np.random.default_rng([seed, crc32(name.encode()), crc32(role.encode())]).integers(available)
-    return sorted(((np.arange(count) * available // count + first) % available).tolist())
+    return sorted(((np.arange(chosen) * available // chosen + first) % available).tolist())
