@@ -95,9 +95,9 @@ class MatchedPair:
     def steady_descriptors(self) -> tuple[list[FloatArray], list[FloatArray]]:
         """Unit descriptors that change little from view to view, of each view's patches, of the reference and of the target."""
         directions = discriminant_directions((self.reference, self.target), STEADY_DIMS)
-        mean = self._basis.mean.astype(np.float32)
         of_reference, of_target = (
-            [unit((view.descriptors.astype(np.float32) - mean) @ directions) for view in views] for views in (self.reference, self.target)
+            [unit(np.asarray((view.descriptors - self._basis.mean) @ directions, dtype=np.float32)) for view in views]
+            for views in (self.reference, self.target)
         )
         return of_reference, of_target
 
