@@ -88,6 +88,19 @@ def speed(
 
 
 @app.command()
+def rendering(
+    category: Annotated[list[str] | None, typer.Option(help="Category of the simulator; may be repeated; all where left out.")] = None,
+    frames: Annotated[int, typer.Option(min=1, help="Frames of each object.")] = 12,
+    seed: Seed = 0,
+    json: JsonFile = None,
+) -> None:
+    """Frames a second of the simulated world."""
+    from benchmarks.rendering import run
+
+    run(json, category or [], frames, seed)
+
+
+@app.command()
 def isolation(
     data: Data,
     source: Annotated[list[str] | None, typer.Option(help="Source of the foreground; may be repeated; all where left out.")] = None,
