@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from clients.cli.terminal import console
+from clients.cli.terminal import Json, console, print_json, progress_bar
 
 SHEET = "contact-sheet.jpg"
 
@@ -21,14 +21,16 @@ def render(
     meshes: Annotated[
         Path | None, typer.Option(help="Folder CATEGORY/INSTANCE.obj, .glb or .ply to render in place of the simulator's own objects.")
     ] = None,
+    json: Json = False,
 ) -> None:
     """Render objects of the simulated world as recordings in the data layout, and a contact sheet of them."""
-    from rich.progress import track
-
     from clients.simulator.raycast.export import contact_sheet, draw_models, export
     from clients.simulator.raycast.user_meshes import find_models
 
     models = find_models(meshes) if meshes else draw_models(category or [], instances, seed)
-    folders = list(track(export(models, views, out, seed), "rendering", total=len(models), console=console))
+    folders = list(progress_bar(export(models, views, out, seed), "rendering", len(models)))
     contact_sheet(folders, 8, out / SHEET)
+    if json:
+        print_json([str(folder) for folder in folders])
+        return
     console.print(f"{len(folders)} objects in {out}, {views} views each; all of them at a glance: {out / SHEET}")
