@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from clients.cli.terminal import Json, console, print_json, progress_bar
+from clients.cli.terminal import Json, console, errors, print_json, progress_bar
 
 
 def samples(
@@ -22,7 +22,8 @@ def samples(
     """Make small copies of recorded objects, in the same layout, drawn by a seed."""
     from clients.datasets.shrink import ShrinkConfig, shrink
 
-    names = shrink(data, out, ShrinkConfig(categories=categories, instances=instances, views=views), seed=seed)
+    with errors.status("making small copies"):
+        names = shrink(data, out, ShrinkConfig(categories=categories, instances=instances, views=views), seed=seed)
     if json:
         print_json([str(out / name) for name in names])
     else:
@@ -38,7 +39,8 @@ def convert(
     from clients.datasets.convert import convert as write
     from clients.datasets.sources import find_sequences
 
-    sequences = find_sequences(source)
+    with errors.status(f"reading {source}"):
+        sequences = find_sequences(source)
     written = list(progress_bar(write(sequences, out), "converting", len(sequences)))
     if json:
         print_json([str(folder) for folder in written])

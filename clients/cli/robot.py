@@ -12,7 +12,7 @@ import typer
 from clients.bop_results import HEADER, bop_lines, number_of
 from clients.cli.categories import find
 from clients.cli.local import connected
-from clients.cli.terminal import URL, Folder, Json, Url, console, print_facts, print_json, progress_bar
+from clients.cli.terminal import URL, Folder, Json, Url, console, errors, print_facts, print_json, progress_bar
 from clients.errors import ClientError
 from clients.robot import Observation, RobotClient
 
@@ -57,7 +57,8 @@ def observe(
             options["category_id"] = find(robot.categories(), category).id
         if threshold is not None:
             options["threshold"] = threshold
-        seen = robot.observe(burst, **options)
+        with errors.status(f"asking about {len(burst)} views"):
+            seen = robot.observe(burst, **options)
         if form is Format.vision_msgs:
             print_json(robot.detections(seen.id))
         elif form is Format.bop:
@@ -79,11 +80,13 @@ def scan(
     """Teach the memory a category from one recorded object."""
     _, recorded = _recording(folder)
     with connected(url, local) as robot:
-        request = robot.scan(recorded.select(_spread(recorded, GLANCE_VIEWS)))
+        with errors.status("looking for the object"):
+            request = robot.scan(recorded.select(_spread(recorded, GLANCE_VIEWS)))
         burst = recorded.select(_spread(recorded, views))
         for view in progress_bar(burst.views, "sending views", len(burst)):
             request.add(view)
-        category = request.complete(name)
+        with errors.status("learning"):
+            category = request.complete(name)
     if json:
         print_json(asdict(category))
     else:
