@@ -14,6 +14,7 @@ from core.descriptors import PcaBasis
 from core.encode import EncodedBurst, EncodedView
 from core.reference import Reference
 from core.scan import ScanRequest
+from core.sim3 import Sim3
 from core.views import Burst, Camera, View
 from store.memory import Memory
 from store.records import Category
@@ -96,3 +97,25 @@ def other(memory: Memory, category: Category, reference: Reference, burst: Burst
 def request_for_views() -> ScanRequest:
     """Two viewpoints."""
     return ScanRequest(np.array([0.1, 0.2, 0.3]), np.array([0.0, 0.0, 1.0]), 0.8, np.stack([np.eye(4)] * 2), 0.4)
+
+
+@pytest.fixture
+def learnt(memory: Memory, category: Category, other: Category) -> Memory:
+    """Two categories, made with a backbone; the first has a goal."""
+    memory.require_backbone("colour", "fingerprint-a")
+    memory.goals.create(category.id, "shelf", Sim3.identity(), frame="map", anchor="base")
+    return memory
+
+
+@pytest.fixture
+def second(tmp_path: Path) -> Iterator[Memory]:
+    """Another robot's memory, of the same backbone."""
+    with Memory.open(tmp_path / "second") as memory:
+        memory.require_backbone("colour", "fingerprint-a")
+        yield memory
+
+
+@pytest.fixture
+def archive(learnt: Memory, tmp_path: Path) -> Path:
+    """Everything, exported."""
+    return learnt.export(tmp_path / "all.zip").path
