@@ -90,7 +90,7 @@ def npz() -> Callable[..., bytes]:
 @pytest.fixture
 def settings(tmp_path: Path) -> Settings:
     """Settings of a small service in a temporary folder."""
-    return Settings(data_dir=tmp_path / "memory", max_views=12, max_upload_mb=8, variant="ucd")
+    return Settings(data_dir=tmp_path / "memory", max_views=12, max_upload_mb=8, variant="ucd", score="pooled_best_view")
 
 
 @pytest.fixture

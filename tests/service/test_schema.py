@@ -15,7 +15,7 @@ from schemathesis.specs.openapi.checks import content_type_conformance, response
 from service.app import create_app
 from service.settings import Settings
 
-EXAMPLES = 8
+EXAMPLES = 5
 """Drawn for each operation, beside those that cover each constraint of its parameters."""
 CHECKS = [not_a_server_error, status_code_conformance, content_type_conformance, response_schema_conformance]
 STREAM = "/v1/events"
