@@ -25,6 +25,10 @@ class CategoryGallery:
         self._categories = agent.memory.categories
         self._id = category_id
 
+    def rgb(self, index: int) -> Picture:
+        """The view as it came."""
+        return self._categories.view(self._id, index).rgb
+
     def depth(self, index: int) -> Picture:
         """Raises NotFound also for a view without depth."""
         depth_m = self._categories.view(self._id, index).depth_m

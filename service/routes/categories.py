@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Annotated
 
 from fastapi import APIRouter, Path, Response
-from fastapi.responses import FileResponse
 
 from service.deps import ActorDep, AgentDep, WorkDep
 from service.exchange import MemoryRoute
@@ -85,9 +84,9 @@ def category_similarity(category_id: str, agent: AgentDep) -> CategorySimilariti
 
 
 @router.get("/{category_id}/views/{view}/rgb.png", response_class=Response, responses=PNG_RESPONSES)
-def category_rgb(category_id: str, view: View, agent: AgentDep) -> FileResponse:
+def category_rgb(category_id: str, view: View, agent: AgentDep) -> Response:
     """A reference view."""
-    return FileResponse(agent.memory.categories.rgb_file(category_id, view), media_type="image/png")
+    return png(CategoryGallery(agent, category_id).rgb(view))
 
 
 @router.get("/{category_id}/views/{view}/depth.png", response_class=Response, responses=PNG_RESPONSES)

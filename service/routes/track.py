@@ -10,6 +10,7 @@ import anyio
 from anyio.to_thread import run_sync
 from fastapi import APIRouter, WebSocket, WebSocketDisconnect, status
 from pydantic import BaseModel, ValidationError
+from starlette.websockets import WebSocketState
 
 from core.errors import OneLookError, Unavailable
 from service.agent import Agent
@@ -137,7 +138,7 @@ async def _answer_frames(socket: WebSocket, tracker: Tracker, agent: Agent, work
                     await _send(socket, Announcement(type=kind, frame_id=update.frame_id))
             names = await run_sync(agent.names) if update.decision else {}
             await _send(socket, FrameAnswer.of(update, tracker.category_id, names, (time.monotonic() - arrived_s) * 1e3))
-    except (WebSocketDisconnect, RuntimeError):  # it went away while it was being answered
+    except WebSocketDisconnect:  # it went away while it was being answered
         waiting.close()
 
 
@@ -150,7 +151,9 @@ async def _text(socket: WebSocket) -> str:
 
 
 async def _send(socket: WebSocket, message: BaseModel) -> None:
-    """Waits while the other side does not take it: meanwhile frames are dropped, not queued."""
+    """Waits while the other side does not take it: meanwhile frames are dropped, not queued. Raises WebSocketDisconnect."""
+    if socket.application_state != WebSocketState.CONNECTED or socket.client_state != WebSocketState.CONNECTED:
+        raise WebSocketDisconnect
     await socket.send_text(message.model_dump_json())
 
 
