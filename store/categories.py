@@ -16,7 +16,7 @@ from core.reference import Reference
 from core.views import Burst, View
 from store.arrays import arrays_file, read_arrays, write_arrays
 from store.audit import record
-from store.bursts import read_view, rgb_file, write_burst
+from store.bursts import read_view, write_burst
 from store.columns import files_from_json, files_to_json
 from store.connection import Connection, Row, new_id, only
 from store.folders import Files
@@ -148,11 +148,6 @@ class Categories:
         """One reference view. Raises NotFound."""
         self._require_view(category_id, index)
         return read_view(self.folder(category_id), index)
-
-    def rgb_file(self, category_id: str, index: int) -> Path:
-        """The colour image of one reference view. Raises NotFound."""
-        self._require_view(category_id, index)
-        return rgb_file(self.folder(category_id), index)
 
     def folder(self, category_id: str) -> Path:
         """Where its files are."""
