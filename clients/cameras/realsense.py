@@ -1,16 +1,19 @@
 """Intel RealSense depth cameras, through pyrealsense2 (`pip install 'onelook[realsense]'`).
 
-Depth is aligned to colour; intrinsics and depth scale are read from the device. Tested on recordings that the SDK writes of a software
-device and plays back, not on a camera.
+Depth is aligned to colour; intrinsics, distortion and depth scale are read from the device, and images are given without distortion.
+Tested on recordings that the SDK writes of a software device and plays back, and against its arithmetic, not on a camera.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
+import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from clients.cameras.base import Frame
 from core.errors import Unavailable
@@ -56,8 +59,10 @@ class RealSense:
         self._align = self._rs.align(self._rs.stream.color)
         self.depth_scale_m = float(profile.get_device().first_depth_sensor().get_depth_scale())
         """Metres a unit of its depth images."""
-        self.K = self._intrinsics(profile.get_stream(self._rs.stream.color).as_video_stream_profile().get_intrinsics())
+        found = profile.get_stream(self._rs.stream.color).as_video_stream_profile().get_intrinsics()
+        self.K = np.array([[found.fx, 0, found.ppx], [0, found.fy, found.ppy], [0, 0, 1]])
         """Of its colour images, shape (3, 3)."""
+        self._map = straightening_map(found, self._rs.distortion)
         self._skip(WARM_UP_FRAMES)
 
     def __enter__(self) -> RealSense:
@@ -77,7 +82,11 @@ class RealSense:
         # Copied: the SDK takes its buffers back.
         rgb = np.array(frames.get_color_frame().get_data(), dtype=np.uint8)
         units = np.asarray(frames.get_depth_frame().get_data())
-        return Frame(rgb, (units * self.depth_scale_m).astype(np.float32), self.K)
+        depth_m = (units * self.depth_scale_m).astype(np.float32)
+        if self._map is not None:
+            rgb = np.asarray(cv2.remap(rgb, *self._map, cv2.INTER_LINEAR))
+            depth_m = np.asarray(cv2.remap(depth_m, *self._map, cv2.INTER_NEAREST))
+        return Frame(rgb, depth_m, self.K)
 
     def _find(self, serial: str | None) -> str:
         """The serial number of the camera meant. The SDK's own search would wait for a quarter of a minute."""
@@ -97,10 +106,33 @@ class RealSense:
         except RuntimeError as error:
             raise Unavailable(f"the RealSense camera gives no frames ({error}); plug it in again") from error
 
-    def _intrinsics(self, found: Any) -> FloatArray:
-        if any(found.coeffs) and found.model != self._rs.distortion.none:
-            raise Unavailable(f"the camera's colour images are distorted ({found.model}, {found.coeffs}); rectify them first")
-        return np.array([[found.fx, 0, found.ppx], [0, found.fy, found.ppy], [0, 0, 1]])
+
+def straightening_map(found: Any, models: Any) -> tuple[NDArray[np.float32], NDArray[np.float32]] | None:
+    """Where each pixel of a pinhole camera's image, with the same K, is in the distorted one: x and y, each (H, W); None where it is none.
+
+    Args:
+        found: the SDK's intrinsics of a stream.
+        models: its names of distortions.
+
+    Raises Unavailable for a distortion that is none of Brown and Conrady's.
+    """
+    if found.model == models.none or not any(found.coeffs):
+        return None
+    x, y = np.meshgrid((np.arange(found.width) - found.ppx) / found.fx, (np.arange(found.height) - found.ppy) / found.fy)
+    # The SDK projects by one polynomial for both, whatever the name of the second says.
+    if found.model not in (models.brown_conrady, models.inverse_brown_conrady):
+        raise Unavailable(f"the camera's colour images are distorted in a way that is not known here ({found.model}); rectify them first")
+    bent = _polynomial(x, y, found.coeffs)
+    across, down = bent[0] * found.fx + found.ppx, bent[1] * found.fy + found.ppy
+    return across.astype(np.float32), down.astype(np.float32)
+
+
+def _polynomial(x: FloatArray, y: FloatArray, coeffs: Sequence[float]) -> tuple[FloatArray, FloatArray]:
+    """Brown and Conrady's, of coordinates in the plane at depth 1."""
+    k1, k2, p1, p2, k3 = coeffs
+    r2 = x**2 + y**2
+    radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3))
+    return x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x**2), y * radial + 2 * p2 * x * y + p1 * (r2 + 2 * y**2)
 
 
 def _library() -> Any:

@@ -129,3 +129,26 @@ def test_a_missing_library_is_said_with_the_remedy(monkeypatch: pytest.MonkeyPat
     monkeypatch.setitem(sys.modules, "pyrealsense2", None)
     with pytest.raises(Unavailable, match=r"pip install 'onelook\[realsense\]'"):
         RealSense()
+
+
+@pytest.mark.parametrize("model", [rs.distortion.brown_conrady, rs.distortion.inverse_brown_conrady])
+def test_a_lens_is_taken_out_as_the_sdk_does(model: Any) -> None:
+    """The ray that the SDK gives a distorted pixel is that of the pinhole camera's pixel which takes its colour from there."""
+    lens = _stream(rs.stream.color, 1, rs.format.rgb8, 3, COLOUR).intrinsics
+    lens.model, lens.coeffs = model, [-0.056, 0.065, 0.001, -0.0008, -0.02]
+    found = realsense.straightening_map(lens, rs.distortion)
+    assert found is not None
+    across, down = found
+    assert np.abs(across - np.arange(SIZE[1])).max() > 0.1
+    for row, column in ((0, 0), (5, 60), (40, 10), (47, 63)):
+        x, y, _ = rs.rs2_deproject_pixel_to_point(lens, [float(across[row, column]), float(down[row, column])], 1.0)
+        np.testing.assert_allclose([x, y], [(column - 30.5) / 70, (row - 25.5) / 72], atol=3e-5)
+
+
+def test_no_lens_is_left_alone_and_an_unknown_one_is_said() -> None:
+    lens = _stream(rs.stream.color, 1, rs.format.rgb8, 3, COLOUR).intrinsics
+    lens.model = rs.distortion.inverse_brown_conrady
+    assert realsense.straightening_map(lens, rs.distortion) is None
+    lens.model, lens.coeffs = rs.distortion.ftheta, [0.1, 0, 0, 0, 0]
+    with pytest.raises(Unavailable, match="ftheta"):
+        realsense.straightening_map(lens, rs.distortion)
