@@ -18,8 +18,8 @@ import httpx
 from clients.errors import Unreachable
 
 HOST = "127.0.0.1"
-START_S = 120.0
-"""A cold start loads torch and the weights from a slow disk."""
+START_S = 300.0
+"""A cold start loads torch and the weights from a slow disk, on a machine that may be busy."""
 STOP_S = 10.0
 POLL_S = 0.2
 LOG_LINES = 12

@@ -52,12 +52,14 @@ class Timeline:
         self.encounters = encounters
         self._step = (WIDTH - LEFT) / max(1, len(encounters))
         asked = [(each, each.similarity) for each in encounters if each.similarity is not None]
-        thresholds = [each.threshold for each in encounters if each.threshold is not None]
-        values = [value for _, value in asked] + thresholds or [0.0, 1.0]
+        limited = [(each, each.threshold) for each in encounters if each.threshold is not None]
+        values = [value for _, value in [*asked, *limited]] or [0.0, 1.0]
         margin = 0.08 * (max(values) - min(values)) or 0.1
         self._low, self._high = min(values) - margin, max(values) + margin
         self.similarities = [Mark(each, self.x(each), self._similarity_y(value), value) for each, value in asked]
-        self.threshold = Tick(self._similarity_y(thresholds[0]), f"{thresholds[0]:.2f}") if thresholds else None
+        self.threshold = Tick(self._similarity_y(limited[-1][1]), f"{limited[-1][1]:.2f}") if limited else None
+        self.limits = [Mark(each, self.x(each), self._similarity_y(value), value) for each, value in limited]
+        self.half_step = round(self._step / 2, 1)
         posed = [(each, each.error.rotation_deg) for each in encounters if each.error is not None]
         self.errors = [Mark(each, self.x(each), self._error_y(degrees), degrees) for each, degrees in posed]
         self.acc = Tick(self._error_y(ACC_DEG[0]), f"{ACC_DEG[0]:.0f}°")
