@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from core.backbones.base import Features
+from service.settings import Settings
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "http.md"
@@ -32,7 +33,7 @@ def url(settings: Any, backbone: Any, serving: Any) -> Iterator[str]:
             small = cv2.resize(disc, found.attention.shape[1:], interpolation=cv2.INTER_AREA)
             return Features(found.patches, found.cls, np.stack([small] * len(images)), np.stack([disc] * len(images)))
 
-    with serving(settings, Middle()) as address:
+    with serving(settings.model_copy(update={"score": Settings().score}), Middle()) as address:
         yield address
 
 
