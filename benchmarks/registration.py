@@ -43,7 +43,8 @@ def register(reference: EncodedBurst, target: EncodedBurst, method: str, seed: i
     features = [_registration.compute_fpfh_feature(cloud, search) for cloud in (source, aim)]  # type: ignore[call-arg]
     o3d.utility.random.seed(seed)
     solve = _by_ransac if method == "fpfh" else _by_fgr
-    result = solve(source, aim, features[0], features[1], voxel_m)
+    with o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):  # it warns of falling back to matches that are not mutual
+        result = solve(source, aim, features[0], features[1], voxel_m)
     if not result.fitness > 0:
         raise NoPose("no descriptors of the two clouds correspond")
     matrix = np.asarray(result.transformation)
