@@ -42,7 +42,7 @@ def rearrange(
             for trial in batch:
                 done.append(trial)
                 how = trial.failure or f"{trial.rotation_deg:.1f}° and {100 * (trial.position_m or 0):.1f} cm off"
-                screen.print(f"{trial.number:>3}  {trial.name:<24} {how}", highlight=False)
+                screen.print(f"{trial.number:>3}  {trial.name or trial.category:<24} {how}", highlight=False)
                 status.update(f"{len(done) + 1} of {trials}")
         summary = summarise(done, time.perf_counter() - started)
     settings: dict[str, object] = {"categories": categories, "trials": trials, "views": views, "seed": seed}
@@ -57,8 +57,8 @@ def rearrange(
             "brought to the goal": f"{summary.moved} of {summary.trials}; {summary.recognised} recognised",
             "within 30° and 5 cm": f"{summary.success:.0f} % of all",
             "Acc30, Acc15, Acc7.5": f"{summary.acc30:.0f} %, {summary.acc15:.0f} %, {summary.acc7_5:.0f} % of all",
-            "rotation": f"{_or_none(summary.median_deg, 1)}° median, {summary.start_median_deg:.0f}° before",
-            "position of the base": f"{_or_none(summary.median_m, 100)} cm median, {100 * summary.start_median_m:.0f} cm before",
+            "rotation": f"{_or_none(summary.median_deg, 1)}° median, {_or_none(summary.start_median_deg, 1)}° before",
+            "position of the base": f"{_or_none(summary.median_m, 100)} cm median, {_or_none(summary.start_median_m, 100)} cm before",
             "time": f"{summary.total_s:.0f} s",
             "written": f"{out / 'rearrange.json'}, {out / 'rearrange.png'}",
         }

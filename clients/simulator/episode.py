@@ -99,7 +99,7 @@ class Episode:
         arm.offsets_deg.clear()
         in_memory = self._truth.has(thing.category)
         started = time.perf_counter()
-        seen, burst, looks = self._observe(burst, arm)
+        seen, burst, looks = observe_until_sure(self._robot, arm, burst)
         observe_ms = (time.perf_counter() - started) * 1e3
         founder = self._truth.founder(seen.category_id)
         verdict = judge(seen.outcome, thing.category, founder, in_memory)
@@ -143,21 +143,22 @@ class Episode:
             robot=self._number,
         )
 
-    def _observe(self, burst: Burst, arm: Arm) -> tuple[Observation, Burst, int]:
-        """What the service says; where it is uncertain the views it asks for are added and it is asked again."""
-        for looks in range(1, MOST_LOOKS + 1):
-            seen = self._robot.observe(burst)
-            if seen.outcome != "uncertain" or seen.viewpoints is None or looks == MOST_LOOKS:
-                break
-            more = list(arm.look_around(list(seen.viewpoints), arm.world.center_m))
-            if not more:
-                break
-            burst = Burst([*burst.views, *more])
-        return seen, burst, looks
-
     def _without_lost(self, burst: Burst, chance: random.Random) -> Burst:
         kept = [index for index in range(len(burst)) if chance.random() >= self._conduct.lost_views]
         return burst.select(kept or [0])
+
+
+def observe_until_sure(robot: RobotClient, arm: Arm, burst: Burst, *, learn: bool = True) -> tuple[Observation, Burst, int]:
+    """What the service says in the end, all views, and how often it was asked: where it is uncertain it gets the views that it asks for."""
+    for looks in range(1, MOST_LOOKS + 1):
+        seen = robot.observe(burst, learn=learn)
+        if seen.outcome != "uncertain" or seen.viewpoints is None or looks == MOST_LOOKS:
+            break
+        more = list(arm.look_around(list(seen.viewpoints), arm.world.center_m))
+        if not more:
+            break
+        burst = Burst([*burst.views, *more])
+    return seen, burst, looks
 
 
 def require_own_memory(robot: RobotClient, done: Sequence[Encounter]) -> None:

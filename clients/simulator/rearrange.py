@@ -18,6 +18,7 @@ import numpy as np
 from clients.errors import ServiceProblem
 from clients.robot import RobotClient
 from clients.simulator.arm import UP, Arm, ArmConfig
+from clients.simulator.episode import observe_until_sure
 from clients.simulator.raycast.categories import RECIPES
 from clients.simulator.raycast.mesh import rotation_about
 from clients.simulator.raycast.model import Model
@@ -51,8 +52,9 @@ class Trial:
     """Between how the object stands in the end and how the reference stood at the goal, modulo its symmetries."""
     position_m: float | None
     """Between the middles of their bases."""
-    start_rotation_deg: float
-    start_position_m: float
+    start_rotation_deg: float | None
+    start_position_m: float | None
+    """Before; None where the reference could not be shown at the goal."""
     failure: str | None
     motion_s: float
     """Simulated."""
@@ -73,8 +75,8 @@ class RearrangeSummary:
     """Percent of the trials that end within ASTRAY_M and ASTRAY_DEG."""
     median_deg: float | None
     median_m: float | None
-    start_median_deg: float
-    start_median_m: float
+    start_median_deg: float | None
+    start_median_m: float | None
     total_s: float
 
 
@@ -102,8 +104,11 @@ class Rearrangement:
 
     def _trial(self, number: int, category: str) -> Trial:
         started = time.perf_counter()
-        if category not in self._goals:
-            self._show_goal(category)
+        try:
+            if category not in self._goals:
+                self._show_goal(category)
+        except ServiceProblem as problem:
+            return Trial(number, "", category, "", False, None, None, None, None, f"no goal: {problem}", 0.0, time.perf_counter() - started)
         goal_id, category_id, goal, reference = self._goals[category]
         model = RECIPES[category].make(category, self._seed * 1000 + number)
         world = self._world(number)
@@ -116,7 +121,7 @@ class Rearrangement:
         after, failure, recognised = None, None, False
         picture = self._picture(world)
         try:
-            seen = self._robot.observe(burst, learn=False)
+            seen, _, _ = observe_until_sure(self._robot, arm, burst, learn=False)
             recognised = seen.outcome == "known" and seen.category_id == category_id
             if recognised:
                 plan = self._robot.plan(goal_id, seen.id, anchor="base", up=(0.0, 0.0, 1.0))
@@ -187,12 +192,16 @@ def summarise(trials: Sequence[Trial], total_s: float) -> RearrangeSummary:
         acc15=share(15.0),
         acc7_5=share(7.5),
         success=share(ASTRAY_DEG, ASTRAY_M),
-        median_deg=float(np.median([degrees for degrees, _ in moved])) if moved else None,
-        median_m=float(np.median([metres for _, metres in moved])) if moved else None,
-        start_median_deg=float(np.median([each.start_rotation_deg for each in trials])),
-        start_median_m=float(np.median([each.start_position_m for each in trials])),
+        median_deg=_median([degrees for degrees, _ in moved]),
+        median_m=_median([metres for _, metres in moved]),
+        start_median_deg=_median([each.start_rotation_deg for each in trials if each.start_rotation_deg is not None]),
+        start_median_m=_median([each.start_position_m for each in trials if each.start_position_m is not None]),
         total_s=total_s,
     )
+
+
+def _median(values: Sequence[float]) -> float | None:
+    return float(np.median(values)) if values else None
 
 
 def write_picture(rows: Sequence[FloatArray], file: Path) -> None:

@@ -38,7 +38,11 @@ class Oracle:
             raise NoPoseProblem("no transform explains the views", status=422)
         return SimpleNamespace(id="o", outcome="known", category_id="c")
 
+    refuse_goals = False
+
     def set_goal(self, category_id: str, source: str, **options: Any) -> Any:
+        if self.refuse_goals:
+            raise NoPoseProblem("the reference has no pose", status=422)
         self._goal = self._worlds[-1].objects[0].world_from_model
         return SimpleNamespace(id="g")
 
@@ -87,6 +91,7 @@ def test_a_plan_that_is_off_is_measured_to_be_off(worlds: list[RaycastWorld], sm
     (trial,) = trials
     assert trial.rotation_deg == pytest.approx(10.0, abs=1e-3)
     assert trial.position_m == pytest.approx(0.02, abs=1e-6)
+    assert trial.start_position_m is not None
     assert trial.start_position_m > 0.15
     assert trial.name != trial.reference
     assert trial.motion_s > 5
@@ -102,3 +107,12 @@ def test_a_refused_plan_moves_nothing_and_counts_as_wrong(worlds: list[RaycastWo
     assert trial.failure == "no transform explains the views"
     summary = summarise([trial], 1.0)
     assert (summary.trials, summary.moved, summary.acc30, summary.success, summary.median_deg) == (1, 0, 0.0, 0.0, None)
+
+
+def test_a_goal_that_cannot_be_shown_costs_its_trials_and_no_others(worlds: list[RaycastWorld], small: SensorConfig) -> None:
+    robot = Oracle(worlds)
+    robot.refuse_goals = True
+    trials = list(batch(robot, small, trials=2))
+    assert [each.failure for each in trials] == ["no goal: the reference has no pose"] * 2
+    summary = summarise(trials, 1.0)
+    assert (summary.trials, summary.moved, summary.start_median_deg) == (2, 0, None)
