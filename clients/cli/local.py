@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import asyncio
-import threading
-from collections.abc import Coroutine, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import httpx
 
 from clients.cli.terminal import errors
 from clients.robot import RobotClient
 
-T = TypeVar("T")
+if TYPE_CHECKING:
+    from anyio.from_thread import BlockingPortal
 
 
 @contextmanager
@@ -33,17 +32,13 @@ def connected(url: str, local: bool) -> Iterator[RobotClient]:
 class InProcess(httpx.BaseTransport):
     """Hands requests to an application that runs on another thread's event loop."""
 
-    def __init__(self, app: Any, loop: asyncio.AbstractEventLoop) -> None:
+    def __init__(self, app: Any, portal: BlockingPortal) -> None:
         self._transport = httpx.ASGITransport(app, raise_app_exceptions=False)
-        self._loop = loop
+        self._portal = portal
 
     def handle_request(self, request: httpx.Request) -> httpx.Response:
         """One request and its whole answer."""
-        return self.run(self._answer(request))
-
-    def run(self, work: Coroutine[Any, Any, T]) -> T:
-        """The result of `work` on that loop."""
-        return asyncio.run_coroutine_threadsafe(work, self._loop).result()
+        return self._portal.call(self._answer, request)
 
     async def _answer(self, request: httpx.Request) -> httpx.Response:
         response = await self._transport.handle_async_request(request)
@@ -52,23 +47,13 @@ class InProcess(httpx.BaseTransport):
 
 @contextmanager
 def _service_here() -> Iterator[InProcess]:
+    from anyio.from_thread import start_blocking_portal
+
     from clients.cli.service import read_settings
     from service.app import checked_backbone, create_app
 
     settings = read_settings({})
     with errors.status("loading the backbone"):
         app = create_app(settings, backbone=checked_backbone(settings))
-    loop = asyncio.new_event_loop()
-    thread = threading.Thread(target=loop.run_forever, daemon=True)
-    thread.start()
-    transport, lifespan = InProcess(app, loop), app.router.lifespan_context(app)
-    try:
-        transport.run(lifespan.__aenter__())
-        try:
-            yield transport
-        finally:
-            transport.run(lifespan.__aexit__(None, None, None))
-    finally:
-        loop.call_soon_threadsafe(loop.stop)
-        thread.join()
-        loop.close()
+    with start_blocking_portal() as portal, portal.wrap_async_context_manager(app.router.lifespan_context(app)):
+        yield InProcess(app, portal)
