@@ -1,7 +1,8 @@
 """Makes the figures that stand in for a memory's own while it holds little: `python -m benchmarks.decision_prior --data DIR`.
 
 Every burst below DIR is taken out in turn and compared with all others: with its own category (by other instances of it), and with the
-rest as if its own were not there. The shipped file is made from the sample bursts.
+rest as if its own were not there. A memory that holds little has nothing to adapt to, so nothing is adapted here either. The shipped file
+is made from the sample bursts.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ def main(data: Annotated[Path, typer.Option(help="folder of bursts")], out: Anno
     files = encode_all(sequences, Encoder(backbone))
     bursts = [read_encoded(file) for file in track(files, "reading")]
     labels = np.unique([sequence.category for sequence in sequences], return_inverse=True)[1]
-    typer.echo(f"wrote {write(out, labels, matches(bursts, backbone.whitening)[-1], agreements(files, backbone.whitening))}")
+    typer.echo(f"wrote {write(out, labels, matches(bursts, backbone.whitening)[0], agreements(files, backbone.whitening))}")
 
 
 def write(out: Path, labels: NDArray[np.intp], match: FloatArray, agreement: FloatArray) -> Path:

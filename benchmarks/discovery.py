@@ -36,6 +36,8 @@ from core.novelty import BEST, SCORES, require_score
 
 LEVELS = np.concatenate([np.linspace(0, 0.9, 7), 1 - np.geomspace(0.1, 0.001, 20), [1.0]])
 """Quantiles of the similarities between bursts at which a curve has a threshold: dense at the top, where the errors trade."""
+BEYOND = 12
+"""Thresholds between the most similar pair of bursts and a burst to itself: evidence in a small memory is larger than between many."""
 SUMS = 30
 """Further thresholds of a sum, which grows with the members of a category."""
 SUM_REACH = 10.0
@@ -83,11 +85,12 @@ def run(
     seed: int = 0,
     backbone: str = "dinov2-s14",
     picture: Path | None = None,
+    poses: bool = True,
 ) -> list[Row]:
     """Runs `episodes` episodes of `length` bursts of `data` for every score (all of them where none is named).
 
     Prints one summary line a score, and for `best` one for each false-known rate. Returns, and writes to `json`, rows of FP and FN
-    against threshold with one summary row a score. `picture` gets the curves.
+    against threshold with one summary row a score. `picture` gets the curves. Without `poses`, `best` decides by tokens alone.
 
     Raises InvalidInput for an unknown score, or data without two categories or without two objects of one.
     """
@@ -102,7 +105,8 @@ def run(
     bursts = [read_encoded(file) for file in files]
     tables: dict[str, PairScores | BestPairs] = {score: PairScores.of(bursts, score) for score in PARTS if score in (scores or PARTS)}
     if not scores or BEST in scores:
-        best = BestPairs(matches(bursts, network.whitening), agreements(files, network.whitening), Prior.shipped())
+        agreement = agreements(files, network.whitening) if poses else None
+        best = BestPairs(matches(bursts, network.whitening), agreement, Prior.shipped())
         alone = replace(best, agreement=None)
         tables |= {BEST: best, TOKENS: alone} if has_poses(best) else {BEST: alone}
     orders = draw_orders(episodes, labels, length, seed)
@@ -139,7 +143,7 @@ def has_poses(pairs: BestPairs) -> bool:
 
 def score_rows(name: str, pairs: PairScores | BestPairs, labels: NDArray[np.intp], orders: list[list[int]]) -> list[Row]:
     """A row for each threshold, ascending, then the summary row."""
-    single, own = pairs.single(), default_threshold(name)
+    single, own = pairs.single(), default_threshold(name, pairs)
     thresholds = threshold_grid(name, pairs, single, own)
     counts = sum_jobs(run_episodes, pairs, labels, orders, thresholds, name)
     fp, fn, repeat = counts.fp, counts.fn, counts.repeat_error
@@ -228,18 +232,19 @@ def run_calibrated(job: Job) -> calibrated.Answers:
     return total([calibrated.episode(job.pairs, job.labels, order, job.thresholds.tolist()) for order in job.orders])
 
 
-def default_threshold(name: str) -> float:
+def default_threshold(name: str, pairs: PairScores | BestPairs) -> float:
     """The threshold of a score where nobody says otherwise; of `best` the one of a memory that has met nothing, at 1 %."""
     if name in SCORES:
         return SCORES[name].threshold
-    prior = Prior.shipped()
-    return Calibration.fit([], prior.of(name == BEST)).threshold(0.01)
+    verified = isinstance(pairs, BestPairs) and pairs.agreement is not None
+    return Calibration.fit([], Prior.shipped().of(verified)).threshold(0.01)
 
 
 def threshold_grid(name: str, pairs: PairScores | BestPairs, single: FloatArray, own: float) -> FloatArray:
     """Ascending thresholds, shape (T,): where similarities lie, the score's own, and one that nothing exceeds."""
     top = float(single.max())  # of a burst to itself
-    grid = [np.quantile(single[~np.eye(len(single), dtype=bool)], LEVELS), [own, top + TINY]]
+    between = single[~np.eye(len(single), dtype=bool)]
+    grid = [np.quantile(between, LEVELS), np.linspace(float(between.max()), top, BEYOND), [own, top + TINY]]
     if name == "paper_sum" and isinstance(pairs, PairScores):
         grid.append(np.geomspace(top, pairs.total.sum(axis=0).max() * SUM_REACH + TINY, SUMS))
     return np.unique(np.concatenate(grid))

@@ -63,13 +63,14 @@ def discovery(
     length: Annotated[int, typer.Option(min=1, help="Objects met in an episode.")] = 250,
     seed: Seed = 0,
     backbone: Backbone = BACKBONE,
+    poses: Annotated[bool, typer.Option(help="Verify by pose where there is depth: one solve for each pair of objects, cached.")] = True,
     plot: Annotated[Path | None, typer.Option(help="File for the curves, .png or .svg.")] = None,
     json: JsonFile = None,
 ) -> None:
     """How well known and novel objects are told apart."""
     from benchmarks.discovery import run
 
-    run(data, score or [], json, episodes, length, seed, backbone, plot)
+    run(data, score or [], json, episodes, length, seed, backbone, plot, poses)
 
 
 @app.command()

@@ -74,7 +74,7 @@ def kind_of_tokens(kind: int, seed: int, views: int = 4) -> np.ndarray:
     """Patches, shape (V, K, D), of an instance: its kind's tokens, somewhat its own, view by view."""
     rng = np.random.default_rng([kind, seed])
     own = ROOM[kind] + 0.3 * rng.normal(size=384)
-    return own + 0.6 * rng.normal(size=(views, PATCHES, 384))
+    return own + 0.4 * rng.normal(size=(views, PATCHES, 384))
 
 
 def member(kind: int, seed: int) -> Member:
