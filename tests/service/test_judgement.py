@@ -1,0 +1,59 @@
+"""Decisions by evidence, with a memory behind them."""
+
+from __future__ import annotations
+
+import pytest
+
+from service.agent import Agent, AgentConfig, ObserveOptions
+from store.memory import Memory
+
+
+@pytest.fixture
+def agent(tmp_path, backbone, look):
+    """An agent that knows one kind of object."""
+    with Memory.open(tmp_path / "memory") as memory:
+        made = Agent(backbone, memory, AgentConfig("best", variant="best"))
+        scan = made.scanning.begin(look())
+        made.scanning.add(scan.id, look())
+        made.scanning.complete(scan.id)
+        yield made
+
+
+def test_poses_verify_and_the_winner_s_is_the_answer_s(agent, look):
+    seen = agent.observe(look(), ObserveOptions(learn=False))
+    assert (seen.outcome, seen.decision.verified) == ("known", True)
+    assert seen.decision.similarity > seen.decision.threshold > seen.decision.uncertain_above
+    assert seen.pose is not None
+    assert "load" not in seen.timings_ms  # the pose came with the decision
+
+
+def test_learning_not_asked_for_leaves_no_trace(agent, look):
+    (category,) = agent.memory.categories.all()
+    before = len(agent.memory.instances.of(category.id))
+    seen = agent.observe(look(), ObserveOptions(learn=False))
+    assert len(agent.memory.instances.of(category.id)) == before
+    assert [decision.rival for decision in agent.memory.observations.decisions(10)] == [None]
+    assert agent.observe(look(), ObserveOptions(learn=False)).decision.threshold == seen.decision.threshold
+
+
+def test_a_known_burst_below_the_stricter_level_does_not_join(agent, look):
+    (category,) = agent.memory.categories.all()
+    rate = 0.4  # a tenth of it is still stricter
+    seen = agent.observe(look(), ObserveOptions(false_known_rate=rate))
+    (_, *joined) = agent.memory.instances.of(category.id)
+    assert seen.decision.threshold < seen.decision.learn_above
+    assert bool(joined) == (seen.decision.similarity > seen.decision.learn_above)
+
+
+def test_an_uncertain_object_gets_viewpoints_and_no_category(agent, look):
+    sure = agent.observe(look("dark", views=2), ObserveOptions(learn=False)).decision
+    rates = [10.0**-power for power in range(1, 12)]
+    for rate in rates:
+        seen = agent.observe(look("dark", views=2), ObserveOptions(learn=False, false_known_rate=rate))
+        if seen.outcome == "uncertain":
+            break
+    else:
+        pytest.fail(f"no rate makes {sure.similarity} uncertain")
+    assert (seen.category_id, seen.pose, seen.scan_id) == (None, None, None)
+    assert seen.viewpoints.shape[1:] == (4, 4)
+    assert agent.memory.observations.get(seen.id).viewpoints.shape == seen.viewpoints.shape
