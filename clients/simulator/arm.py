@@ -50,8 +50,10 @@ class ArmConfig:
 
 AZIMUTHS_DEG = (0, 12, -12, 24, -24, 36, -36, 48, -48)
 ELEVATIONS_DEG = (0, 10, 20, 30, 40)
-CLOSER = (1.0, 0.85)
+CLOSER = (1.0, 0.85, 0.7, 0.55)
 """Where else to look from when a viewpoint is out of reach: around the object, higher, closer."""
+NEAREST_M = 0.4
+"""Closer than this an object is cut off by the image's edge."""
 MOST_OFF_DEG = 50.0
 """A view from farther off than this is none of what was asked for."""
 APART_DEG = 6.0
@@ -158,7 +160,7 @@ def _others(world_from_camera: FloatArray, center_m: FloatArray) -> Iterator[Flo
     for turn in AZIMUTHS_DEG:
         for rise in ELEVATIONS_DEG:
             height = min(elevation + np.radians(rise), np.radians(80))
-            for closer in CLOSER:
+            for closer in (each for each in CLOSER if each == 1.0 or each * radius >= NEAREST_M):
                 level = np.cos(height)
                 towards = np.array([level * np.cos(azimuth + np.radians(turn)), level * np.sin(azimuth + np.radians(turn)), np.sin(height)])
                 yield look_at(center_m + closer * radius * towards, center_m, UP)
