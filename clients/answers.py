@@ -1,6 +1,6 @@
 """What the service answers, as numpy and plain types.
 
-Letters: n requested viewpoints, C categories.
+Letters: n requested viewpoints, C categories, S symmetries.
 """
 
 from __future__ import annotations
@@ -58,6 +58,8 @@ class Pose:
     """Probability that the rotation is within 30°, where the variant estimates one."""
     alternatives: tuple[Alternative, ...]
     """Other transforms that were considered, best first."""
+    symmetries: FloatArray
+    """Rotations about the object frame's origin, in that frame, after which the pose means the same: (w, x, y, z), shape (S, 4)."""
 
     @property
     def matrix(self) -> FloatArray:
@@ -94,6 +96,7 @@ class Pose:
             fields["score"],
             fields["confidence"],
             tuple(Alternative.from_json(each) for each in fields["alternatives"]),
+            np.array(fields["symmetries"], dtype=float).reshape(-1, 4),
         )
 
 

@@ -26,6 +26,7 @@ from core.pnp import by_pnp
 from core.reference import Reference
 from core.sim3 import Sim3
 from core.solvers import axis_scales, by_consensus, by_retrieval, by_single_view, judge, stretched
+from core.symmetry import without_twins
 from core.viewpoints import view_agreement
 
 
@@ -46,7 +47,7 @@ class BestConfig:
     """Hypotheses that are refined: the best of those that differ in rotation."""
     distinct_deg: float = 10.0
     alternative_deg: float = 30.0
-    """An alternative differs by at least this from better ones."""
+    """An alternative differs by at least this from better ones, and from what they are after a symmetry of the reference."""
     alternatives: int = 3
 
 
@@ -161,6 +162,8 @@ class PoseEstimator:
         clock.lap("match")
         threshold_m = self.config.inlier_ratio * cloud_extent_m(target.cloud_m)
         estimate = self._solve(pair, threshold_m, seed, clock)
+        others = without_twins(estimate.alternatives, estimate.target_from_reference, reference.symmetries, config.best.alternative_deg)
+        estimate = replace(estimate, alternatives=others)
         if config.dof == 9:
             estimate = self._stretch(estimate, pair, Sim3.from_matrix(reference.box.world_from_object), threshold_m, seed)
             clock.lap("axis scales")

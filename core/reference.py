@@ -17,6 +17,7 @@ from core.descriptors import PcaBasis
 from core.encode import EncodedBurst, EncodedView
 from core.errors import TooFewViews
 from core.packing import burst_as_arrays, burst_from_arrays
+from core.symmetry import find_symmetries
 
 MIN_VIEWS = 2
 """One view shows one side only; no transform to the other sides could be found."""
@@ -32,7 +33,7 @@ class Reference:
     """Object points without support and outliers, shape (N, 3)."""
     box: OrientedBox
     symmetries: NDArray[np.floating]
-    """Rotations about the box's centre that map the object onto itself, identity left out, shape (S, 3, 3)."""
+    """Rotations about the box's centre that map the object onto itself, identity left out, shape (S, 3, 3); see `core.symmetry`."""
     fingerprint: str
     """The backbone's."""
 
@@ -68,4 +69,5 @@ def build_reference(encoded: EncodedBurst) -> Reference:
     cameras = np.stack([view.camera.world_from_camera[:3, 3] for view in shown if view.camera is not None])
     cloud = remove_outliers(remove_support(encoded.cloud_m, cameras)).astype(np.float32)
     basis = PcaBasis.fit(np.concatenate([view.descriptors for view in encoded.views]))
-    return Reference(encoded.views, basis, cloud, oriented_box(cloud), np.zeros((0, 3, 3)), encoded.fingerprint)
+    box = oriented_box(cloud)
+    return Reference(encoded.views, basis, cloud, box, find_symmetries(shown, basis, box), encoded.fingerprint)

@@ -1,4 +1,4 @@
-"""`onelook bench`: accuracy, discovery, speed and isolation, each a table and JSON."""
+"""`onelook bench`: accuracy, discovery, speed, isolation and symmetries, each a table and JSON."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-app = typer.Typer(help="Measure accuracy, discovery, speed and isolation.", no_args_is_help=True)
+app = typer.Typer(help="Measure accuracy, discovery, speed, isolation and symmetries.", no_args_is_help=True)
 
 Data = Annotated[Path, typer.Option(help="Recorded objects: a folder in the data layout, or bop:, co3d:, transforms: or images:FOLDER.")]
 JsonFile = Annotated[Path | None, typer.Option("--json", help='File for {"meta": …, "rows": …}.')]
@@ -113,3 +113,17 @@ def isolation(
     from benchmarks.isolation import SOURCES, run
 
     run(data, json, source or SOURCES, limit, backbone)
+
+
+@app.command()
+def symmetries(
+    data: Data,
+    views: Annotated[int, typer.Option(min=2, help="Views of each object, evenly spaced in its recording.")] = 10,
+    limit: Annotated[int | None, typer.Option(min=1, help="Objects a category at most.")] = None,
+    backbone: Backbone = BACKBONE,
+    json: JsonFile = None,
+) -> None:
+    """Whether symmetric objects are recognised, against the symmetries that the data declare."""
+    from benchmarks.symmetries import run
+
+    run(data, json, views, limit, backbone)

@@ -1,0 +1,96 @@
+"""Symmetries: which objects are recognised as symmetric from their reference alone, against what the data declare.
+
+A false claim is worse than a miss: it calls different poses the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, fields
+from itertools import groupby
+from pathlib import Path
+
+import numpy as np
+from rich.progress import track
+
+from benchmarks.encoded import encode_all, read_encoded
+from benchmarks.tables import print_table, write_json
+from clients.datasets import folders
+from clients.datasets.sources import find_sequences
+from core.backbones.dino import load_backbone
+from core.encode import Encoder
+from core.errors import InvalidInput
+from core.reference import build_reference
+from core.sim3 import rotation_angle_deg
+from core.views import FloatArray
+
+RIGHT_DEG = 15.0
+"""A claimed turn is right this near a declared one: nearer than half of the finest steps that are claimed."""
+
+
+@dataclass(frozen=True)
+class SymmetryRow:
+    """One line of the table."""
+
+    category: str
+    objects: int
+    symmetric: int
+    """Objects that declare a symmetry."""
+    found: int
+    """Of those, the ones with a claim, all of it right."""
+    complete: int
+    """Of those, the ones whose every declared turn is claimed to within the same angle."""
+    false: int
+    """Objects, symmetric or not, with a claim that is not right."""
+
+
+COLUMNS = tuple(field.name for field in fields(SymmetryRow))
+
+
+def run(data: Path, json: Path | None, views: int = 10, limit: int | None = None, backbone: str = "dinov2-s14") -> list[SymmetryRow]:
+    """Builds a reference of up to `limit` objects a category, from `views` of each; prints and returns the table.
+
+    Raises InvalidInput where no sequence has a ground truth.
+    """
+    groups = folders.by_category(find_sequences(data)).values()
+    sequences = [sequence for group in groups for sequence in group[:limit] if sequence.world_from_model is not None]
+    if not sequences:
+        raise InvalidInput("data", f"no sequence below {data} has scene_gt.json, which declared symmetries need to be compared")
+    network = load_backbone(backbone)
+    files = encode_all(sequences, Encoder(network))
+    judged = [judge(sequence, _claimed(file, views)) for sequence, file in track(list(zip(sequences, files)), "symmetries", transient=True)]
+    rows = table_rows(judged)
+    if json is not None:
+        meta = {"benchmark": "symmetries", "data": data, "views": views, "limit": limit, "fingerprint": network.fingerprint}
+        write_json(json, meta, [asdict(row) for row in rows])
+    print_table(f"Symmetries, {data}", [asdict(row) for row in rows], COLUMNS)
+    return rows
+
+
+def judge(sequence: folders.Sequence, claimed: FloatArray) -> SymmetryRow:
+    """One object's claims, rotations of its world, shape (S, 3, 3), against what it declares."""
+    declared = np.array(sequence.symmetries, dtype=float).reshape(-1, 3, 3)
+    assert sequence.world_from_model is not None
+    world_from_model = sequence.world_from_model.rotation
+    off = rotation_angle_deg((world_from_model.T @ claimed @ world_from_model)[:, None], declared[None])
+    right = bool((off.min(axis=1, initial=180) <= RIGHT_DEG).all())
+    found = bool(len(declared) and len(claimed) and right)
+    complete = found and bool((off.min(axis=0, initial=180) <= RIGHT_DEG).all())
+    return SymmetryRow(sequence.category, 1, int(len(declared) > 0), int(found), int(complete), int(not right))
+
+
+def table_rows(judged: Sequence[SymmetryRow]) -> list[SymmetryRow]:
+    """One row for each category, sorted, and the "all" row: sums over objects."""
+    ordered = sorted(judged, key=lambda row: row.category)
+    rows = [_sum(category, list(group)) for category, group in groupby(ordered, key=lambda row: row.category)]
+    return [*rows, _sum("all", rows)]
+
+
+def _sum(category: str, rows: Sequence[SymmetryRow]) -> SymmetryRow:
+    return SymmetryRow(category, *(sum(getattr(row, column) for row in rows) for column in COLUMNS[1:]))
+
+
+def _claimed(file: Path, views: int) -> FloatArray:
+    encoded = read_encoded(file)
+    chosen = np.linspace(0, len(encoded.views) - 1, min(views, len(encoded.views))).round().astype(int).tolist()
+    return build_reference(encoded.select(chosen)).symmetries
