@@ -24,8 +24,8 @@ from core.reference import build_reference
 from core.sim3 import rotation_angle_deg
 from core.views import FloatArray
 
-RIGHT_DEG = 15.0
-"""A claimed turn is right this near a declared one: nearer than half of the finest steps that are claimed."""
+RIGHT_DEG = 20.0
+"""A claimed turn is right this near a declared one: half of the finest steps that are claimed, and their axis a little off."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class SymmetryRow:
     found: int
     """Of those, the ones with a claim, all of it right."""
     complete: int
-    """Of those, the ones whose every declared turn is claimed to within the same angle."""
+    """Of those, the ones whose every declared turn is near a claimed one, or near none at all."""
     false: int
     """Objects, symmetric or not, with a claim that is not right."""
 
@@ -75,7 +75,8 @@ def judge(sequence: folders.Sequence, claimed: FloatArray) -> SymmetryRow:
     off = rotation_angle_deg((world_from_model.T @ claimed @ world_from_model)[:, None], declared[None])
     right = bool((off.min(axis=1, initial=180) <= RIGHT_DEG).all())
     found = bool(len(declared) and len(claimed) and right)
-    complete = found and bool((off.min(axis=0, initial=180) <= RIGHT_DEG).all())
+    unturned = rotation_angle_deg(declared, np.eye(3))
+    complete = found and bool((off.min(axis=0, initial=180).clip(max=unturned) <= RIGHT_DEG).all())
     return SymmetryRow(sequence.category, 1, int(len(declared) > 0), int(found), int(complete), int(not right))
 
 
