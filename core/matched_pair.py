@@ -77,6 +77,8 @@ class MatchedPair:
             [view.trusted_only() if measured else view for view in views] for views, measured in zip((reference.views, target.views), depth)
         )
         self._basis = reference.basis
+        self.fingerprint = reference.fingerprint
+        """The backbone's."""
         self.descriptors = _describe(self.reference, reference, dims), _describe(self.target, reference, dims)
         sides = [_patches(views, vectors, method) for views, vectors in zip((self.reference, self.target), self.descriptors)]
         self.found: PairMatches = match(sides[0], sides[1], correspondences, method)

@@ -44,6 +44,8 @@ class Alternative:
 
     target_from_reference: Sim3
     score: float
+    confidence: float | None = None
+    """As the estimate's."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +63,7 @@ class PoseEstimate:
     score: float | None = None
     """How well the pose explains both objects (`core.dense`, times the agreement of view pairs), where the variant computes it."""
     confidence: float | None = None
-    """Probability that the rotation is within 30°, where the variant estimates one."""
+    """Probability that the rotation is within 30° (`core.confidence`), where the variant estimates one."""
     alternatives: tuple[Alternative, ...] = ()
     target_from_object: Affine9 | None = None
     """From the frame of the reference's box, with a scale for each of its axes, where 9-D was asked for and is determined.

@@ -13,6 +13,7 @@ import torch
 
 from core.boxes import cloud_extent_m
 from core.clock import StageClock
+from core.confidence import probabilities
 from core.correspond import METHODS
 from core.dense import DenseAgreement, DenseConfig
 from core.descriptors import component_count
@@ -36,8 +37,10 @@ class BestConfig:
 
     hypotheses: HypothesesConfig = field(default_factory=HypothesesConfig)
     dense: DenseConfig = field(default_factory=DenseConfig)
-    polish: DenseConfig = field(default_factory=lambda: DenseConfig(points=1200))
-    """For the last refinement, of the winner alone."""
+    polish: DenseConfig | None = field(default_factory=lambda: DenseConfig(points=1200))
+    """For the last refinement, of the winner alone; None leaves it out."""
+    steady: bool = True
+    """Refines by what is steady from view to view (`core.discriminant`), else by principal components."""
     view_weight: float = 0.05
     """Weight, for each target view, of the agreement of view pairs beside the log of the dense score: every view is further evidence."""
     most_view_weight: float = 0.5
@@ -185,7 +188,8 @@ class PoseEstimator:
         """9-D where that is determined, else 7-D as it was."""
         try:
             if self.config.solver == "agreement":
-                agreement = DenseAgreement(pair.reference, pair.target, pair.steady_descriptors, self.config.best.polish, seed)
+                config = self.config.best.polish or self.config.best.dense
+                agreement = DenseAgreement(pair.reference, pair.target, pair.steady_descriptors, config, seed)
                 transform = agreement.stretch(estimate.target_from_reference, world_from_object)
             else:
                 transform = axis_scales(estimate, pair, world_from_object, threshold_m)
@@ -203,18 +207,31 @@ class PoseEstimator:
         agreement = DenseAgreement(pair.reference, pair.target, pair.descriptors, config.dense, seed)
         promising = distinct(guesses, agreement.score(guesses), config.distinct_deg, config.refined)
         clock.lap("score")
-        steady = DenseAgreement(pair.reference, pair.target, pair.steady_descriptors, config.dense, seed)
-        refined = steady.refine(guesses.select(promising))
+        descriptors = pair.steady_descriptors if config.steady else pair.descriptors
+        refined = DenseAgreement(pair.reference, pair.target, descriptors, config.dense, seed).refine(guesses.select(promising))
         views = view_agreement(refined.rotation.numpy(), pair.relative, pair.similarity, config.view_deg)
         weight = min(config.view_weight * len(pair.target), config.most_view_weight)
         scores = agreement.score(refined) * torch.from_numpy(np.exp(weight * views))
         ranked = distinct(refined, scores, config.alternative_deg, 1 + config.alternatives)
         clock.lap("refine")
-        polish = DenseAgreement(pair.reference, pair.target, pair.steady_descriptors, config.polish, seed)
-        transform = polish.refine(refined.select(ranked[:1]))[0]
+        winner = refined.select(ranked[:1])
+        if config.polish is not None:
+            winner = DenseAgreement(pair.reference, pair.target, descriptors, config.polish, seed).refine(winner)
+        transform = winner[0]
         clock.lap("polish")
         pairs = pair.best_pairs()
         matches, residual_m = judge(pool(pair.found, pairs), transform, pair, threshold_m)
-        alternatives = tuple(Alternative(refined[index], float(scores[index])) for index in ranked[1:])
-        score = float(scores[ranked[0]])
-        return PoseEstimate(transform, matches, pair.similarity, tuple(pairs), residual_m, score=score, alternatives=alternatives)
+        likely = probabilities(scores[ranked].double().numpy(), len(pair.target), pair.fingerprint)
+        best, *rivals = [
+            Alternative(refined[index], float(scores[index]), confidence) for index, confidence in zip(ranked, likely, strict=True)
+        ]
+        return PoseEstimate(
+            transform,
+            matches,
+            pair.similarity,
+            tuple(pairs),
+            residual_m,
+            score=best.score,
+            confidence=best.confidence,
+            alternatives=tuple(rivals),
+        )

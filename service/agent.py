@@ -202,7 +202,7 @@ def _pose_record(estimate: PoseEstimate, reference: Reference, burst: Burst) -> 
         estimate.residual_m,
         estimate.score,
         estimate.confidence,
-        tuple(Alternative(each.target_from_reference, each.score) for each in estimate.alternatives),
+        tuple(Alternative(each.target_from_reference, each.score, each.confidence) for each in estimate.alternatives),
         tuple(_box_px(box, view) for view in burst.views),
         estimate.target_from_object,
         estimate.not_9d_because,

@@ -42,6 +42,21 @@ def pose(
 
 
 @app.command()
+def ablation(
+    data: Data,
+    views: Annotated[list[str], typer.Option(help="As of bench pose; may be repeated.")] = ["10"],  # noqa: B006
+    limit: Annotated[int, typer.Option(min=1, help="Pairs a category at most.")] = 12,
+    seed: Seed = 0,
+    backbone: Backbone = BACKBONE,
+    json: JsonFile = None,
+) -> None:
+    """What each part of the variant best adds to its accuracy."""
+    from benchmarks.ablation import run
+
+    run(data, views, limit, json, seed, backbone)
+
+
+@app.command()
 def paper(
     data: Data,
     limit: Annotated[int | None, typer.Option(min=1, help="Pairs a category at most.")] = None,

@@ -1,0 +1,124 @@
+"""What each part of the variant `best` adds, and where it stops: the same pairs with one part changed at a time.
+
+The last row picks, among the hypotheses that `best` refined, the one nearest the truth: what is lost above it is lost by ranking.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.encoded import encode_all, read_encoded
+from benchmarks.pairs import Pair, ViewCounts, choose_views, sample_pairs
+from benchmarks.parallel import map_jobs
+from benchmarks.tables import print_table, write_json
+from clients.datasets.sources import find_sequences
+from clients.pose_error import rotation_error_deg
+from core.backbones.dino import load_backbone
+from core.encode import Encoder
+from core.errors import NoPose
+from core.hypotheses import HypothesesConfig
+from core.pose import VARIANTS, BestConfig, PoseConfig, PoseEstimator
+from core.reference import build_reference
+
+_BEST = BestConfig()
+_GUESSES = HypothesesConfig()
+CHANGES = {
+    "best": _BEST,
+    "refined by principal components": replace(_BEST, steady=False),
+    "no agreement of view pairs": replace(_BEST, view_weight=0.0),
+    "one hypothesis refined": replace(_BEST, refined=1),
+    "no hypotheses of single pairs": replace(_BEST, hypotheses=replace(_GUESSES, single_pairs=0, aligned_pairs=1)),
+    "no hypotheses of clusters": replace(_BEST, hypotheses=replace(_GUESSES, clusters=0)),
+    "no polish": replace(_BEST, polish=None),
+    "the hypothesis nearest the truth": replace(_BEST, alternatives=_BEST.refined, alternative_deg=_BEST.distinct_deg),
+}
+"""Of the last, the best alternative counts too."""
+ORACLE = "the hypothesis nearest the truth"
+
+
+@dataclass(frozen=True)
+class Job:
+    """One pair."""
+
+    pair: Pair
+    files: tuple[Path, Path]
+    views: ViewCounts
+    seed: int
+
+
+@dataclass(frozen=True)
+class AblationRow:
+    """Means over categories, percent and degrees."""
+
+    change: str
+    views: str
+    pairs: int
+    acc30: float
+    acc15: float
+    acc7_5: float
+    median_deg: float
+    """Median over all pairs."""
+
+
+def run(data: Path, views: Sequence[str], limit: int, json: Path | None, seed: int, backbone: str) -> list[AblationRow]:
+    """Every change of CHANGES under every count of views; prints and returns the table.
+
+    Raises InvalidInput for bad view counts, or data without pairs or ground truth.
+    """
+    network = load_backbone(backbone)
+    pairs = sample_pairs(find_sequences(data), limit, seed)
+    sequences = list(dict.fromkeys(sequence for pair in pairs for sequence in pair))
+    files = dict(zip((sequence.key for sequence in sequences), encode_all(sequences, Encoder(network)), strict=True))
+    counts = [ViewCounts.parse(text) for text in views]
+    jobs = [Job((a, b), (files[a.key], files[b.key]), count, seed) for count in counts for a, b in pairs]
+    errors = map_jobs(solve, jobs, lambda job: 1, "solving")
+    rows = [
+        _row(change, count, [(job.pair[0].category, error[change]) for job, error in zip(jobs, errors, strict=True) if job.views == count])
+        for count in counts
+        for change in CHANGES
+    ]
+    if json is not None:
+        meta = {"benchmark": "ablation", "data": data, "limit": limit, "seed": seed, "fingerprint": network.fingerprint}
+        write_json(json, meta, [asdict(row) for row in rows])
+    print_table(f"Ablation of best, {data}", [asdict(row) for row in rows], list(AblationRow.__dataclass_fields__))
+    return rows
+
+
+def solve(job: Job) -> dict[str, float]:
+    """The rotation error of one pair under every change, degrees; 180 for a refused pose."""
+    sides = zip(job.files, job.pair, ("reference", "target"), (job.views.reference, job.views.target), strict=True)
+    reference, target = (
+        read_encoded(file).select(choose_views(sequence.name, role, len(sequence.images), count, job.seed))
+        for file, sequence, role, count in sides
+    )
+    learnt = build_reference(reference)
+    truths = [sequence.world_from_model for sequence in job.pair]
+    assert truths[0], "sample_pairs requires ground truth"
+    assert truths[1], "sample_pairs requires ground truth"
+    errors = {}
+    for change, config in CHANGES.items():
+        try:
+            estimate = PoseEstimator(_config(config)).estimate(learnt, target, seed=job.seed)
+        except NoPose:
+            errors[change] = 180.0
+            continue
+        rivals = estimate.alternatives if change == ORACLE else ()
+        transforms = [estimate.target_from_reference, *(each.target_from_reference for each in rivals)]
+        found = [rotation_error_deg(each.rotation, truths[0], truths[1], job.pair[1].symmetries) for each in transforms]
+        errors[change] = min(found)
+    return errors
+
+
+def _config(best: BestConfig) -> PoseConfig:
+    return replace(VARIANTS["best"], best=best)
+
+
+def _row(change: str, views: ViewCounts, errors: Sequence[tuple[str, float]]) -> AblationRow:
+    categories = sorted({category for category, _ in errors})
+    of_category = [np.array([error for each, error in errors if each == category]) for category in categories]
+    within = [100 * float(np.mean([(each <= limit).mean() for each in of_category])) for limit in (30, 15, 7.5)]
+    return AblationRow(change, views.text, len(errors), *within, median_deg=float(np.median([error for _, error in errors])))

@@ -1,0 +1,173 @@
+"""Fits the confidence of a pose, and shows whether it is kept: `python -m benchmarks.pose_confidence --fit DIR --data DIR --out FOLDER`.
+
+The model is fitted to the recordings below `--fit` and written where it ships from; the reliability below `--data`, which the fit never
+saw, goes to `--out` as a plot and JSON. Without `--fit` the shipped model is shown.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Annotated
+
+import matplotlib
+import numpy as np
+import typer
+from numpy.typing import NDArray
+
+from benchmarks.encoded import encode_all, read_encoded
+from benchmarks.pairs import ViewCounts, choose_views, sample_pairs
+from benchmarks.parallel import map_jobs
+from benchmarks.tables import print_table, write_json
+from clients.datasets.folders import Sequence as Recording
+from clients.datasets.sources import find_sequences
+from clients.pose_error import rotation_error_deg
+from core.backbones.dino import load_backbone
+from core.confidence import SHIPPED, Confidence, evidence
+from core.encode import Encoder
+from core.errors import NoPose
+from core.pose import VARIANTS, PoseEstimator
+from core.reference import build_reference
+
+RIGHT_DEG = 30.0
+BINS = 5
+"""Of the plot, with as many poses each."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """One pair under one number of views."""
+
+    reference: Recording
+    target: Recording
+    files: tuple[Path, Path]
+    views: ViewCounts
+    seed: int
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """The hypotheses of one estimate, best first."""
+
+    evidence: NDArray[np.floating]
+    """Shape (T, X)."""
+    right: NDArray[np.bool_]
+    """Shape (T,)."""
+
+
+def main(
+    data: Annotated[str, typer.Option(help="Recordings that the reliability is measured on.")],
+    out: Annotated[Path, typer.Option(help="Folder for reliability.png and .json.")],
+    fit: Annotated[str | None, typer.Option(help="Recordings that the model is fitted to.")] = None,
+    views: Annotated[list[str], typer.Option(help="As in onelook bench pose; may be repeated.")] = ["10", "5", "10+3", "10+1"],  # noqa: B006
+    limit: Annotated[int, typer.Option(help="Pairs a category at most.")] = 12,
+    seed: Annotated[int, typer.Option()] = 0,
+) -> None:
+    """Fits, if asked to, and measures."""
+    backbone = load_backbone(report=typer.echo)
+    encoder = Encoder(backbone)
+    if fit is not None:
+        samples = _judge(fit, encoder, views, limit, seed)
+        hypotheses = np.concatenate([each.evidence for each in samples]), np.concatenate([each.right for each in samples])
+        SHIPPED.write_text(json.dumps(asdict(Confidence.fit(backbone.fingerprint, *hypotheses)), indent=1) + "\n")
+        typer.echo(f"wrote {SHIPPED.name} from {len(samples)} poses")
+        Confidence.shipped.cache_clear()
+    judged = _judge(data, encoder, views, limit, seed)
+    best = np.array([Confidence.shipped().probability(each.evidence)[0] for each in judged]), np.array([each.right[0] for each in judged])
+    rows_of = [asdict(row) for row in reliability(*best)]
+    out.mkdir(parents=True, exist_ok=True)
+    meta = {
+        "data": data,
+        "views": views,
+        "limit": limit,
+        "seed": seed,
+        "poses": len(judged),
+        "brier": float(np.mean((best[0] - best[1]) ** 2)),
+    }
+    write_json(out / "reliability.json", meta, rows_of)
+    _plot(out / "reliability.png", rows_of, f"{len(judged)} poses, Brier score {meta['brier']:.3f}")
+    print_table("Confidence", rows_of, list(rows_of[0]))
+
+
+@dataclass(frozen=True)
+class Bin:
+    """Poses of about one confidence; percent."""
+
+    lowest: float
+    highest: float
+    confidence: float
+    """Mean."""
+    right: float
+    """How many were."""
+    poses: int
+
+
+def reliability(confidence: NDArray[np.floating], right: NDArray[np.bool_]) -> list[Bin]:
+    """Poses sorted by confidence, in BINS bins of as many each, given both, shape (T,)."""
+    parts = np.array_split(np.argsort(confidence, kind="stable"), BINS)
+    return [
+        Bin(
+            *(
+                100 * float(value)
+                for value in (confidence[part].min(), confidence[part].max(), confidence[part].mean(), right[part].mean())
+            ),
+            poses=len(part),
+        )
+        for part in parts
+        if len(part)
+    ]
+
+
+def judge(job: Job) -> Judged | None:
+    """The hypotheses of one pair against the truth; None where no pose was found."""
+    seen = [
+        read_encoded(file).select(choose_views(sequence.name, role, len(sequence.images), count, job.seed))
+        for file, sequence, role, count in (
+            (job.files[0], job.reference, "reference", job.views.reference),
+            (job.files[1], job.target, "target", job.views.target),
+        )
+    ]
+    reference = build_reference(seen[0])
+    try:
+        estimate = PoseEstimator(VARIANTS["best"]).estimate(reference, seen[1], seed=job.seed)
+    except NoPose:
+        return None
+    assert estimate.score is not None, "of the variant best"
+    truths = job.reference.world_from_model, job.target.world_from_model
+    assert truths[0], "sample_pairs requires ground truth"
+    assert truths[1], "sample_pairs requires ground truth"
+    rotations = [
+        each.rotation for each in (estimate.target_from_reference, *(each.target_from_reference for each in estimate.alternatives))
+    ]
+    errors = [rotation_error_deg(rotation, truths[0], truths[1], job.target.symmetries) for rotation in rotations]
+    scores = np.array([estimate.score, *(each.score for each in estimate.alternatives)])
+    return Judged(evidence(scores, len(seen[1].views)), np.array(errors) <= RIGHT_DEG)
+
+
+def _judge(data: str, encoder: Encoder, views: Sequence[str], limit: int, seed: int) -> list[Judged]:
+    pairs = sample_pairs(find_sequences(Path(data)), limit, seed)
+    sequences = list(dict.fromkeys(sequence for pair in pairs for sequence in pair))
+    files = dict(zip((sequence.key for sequence in sequences), encode_all(sequences, encoder), strict=True))
+    jobs = [Job(a, b, (files[a.key], files[b.key]), ViewCounts.parse(count), seed) for count in views for a, b in pairs]
+    return [each for each in map_jobs(judge, jobs, lambda job: 1, "solving") if each is not None]
+
+
+def _plot(file: Path, rows: Sequence[dict[str, float]], title: str) -> None:
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+
+    figure, axes = pyplot.subplots(figsize=(5, 5), constrained_layout=True)
+    axes.plot([0, 100], [0, 100], "k--", linewidth=1, label="as said")
+    axes.plot([row["confidence"] for row in rows], [row["right"] for row in rows], "o-", label="as measured")
+    for row in rows:
+        axes.annotate(f"{row['poses']}", (row["confidence"], row["right"]), textcoords="offset points", xytext=(6, -12), fontsize=8)
+    axes.set(xlim=(0, 101), ylim=(0, 101), xlabel="confidence, %", ylabel="rotation within 30°, %", title=title)
+    axes.legend(loc="upper left")
+    figure.savefig(file, dpi=110)
+    pyplot.close(figure)
+
+
+if __name__ == "__main__":
+    typer.run(main)
