@@ -120,5 +120,5 @@ def _config(best: BestConfig) -> PoseConfig:
 def _row(change: str, views: ViewCounts, errors: Sequence[tuple[str, float]]) -> AblationRow:
     categories = sorted({category for category, _ in errors})
     of_category = [np.array([error for each, error in errors if each == category]) for category in categories]
-    within = [100 * float(np.mean([(each <= limit).mean() for each in of_category])) for limit in (30, 15, 7.5)]
-    return AblationRow(change, views.text, len(errors), *within, median_deg=float(np.median([error for _, error in errors])))
+    acc30, acc15, acc7_5 = (100 * float(np.mean([(each <= limit).mean() for each in of_category])) for limit in (30, 15, 7.5))
+    return AblationRow(change, views.text, len(errors), acc30, acc15, acc7_5, float(np.median([error for _, error in errors])))

@@ -106,18 +106,12 @@ class Bin:
 
 def reliability(confidence: NDArray[np.floating], right: NDArray[np.bool_]) -> list[Bin]:
     """Poses sorted by confidence, in BINS bins of as many each, given both, shape (T,)."""
-    parts = np.array_split(np.argsort(confidence, kind="stable"), BINS)
-    return [
-        Bin(
-            *(
-                100 * float(value)
-                for value in (confidence[part].min(), confidence[part].max(), confidence[part].mean(), right[part].mean())
-            ),
-            poses=len(part),
-        )
-        for part in parts
-        if len(part)
-    ]
+    parts = [part for part in np.array_split(np.argsort(confidence, kind="stable"), BINS) if len(part)]
+    return [_bin(100 * confidence[part], right[part]) for part in parts]
+
+
+def _bin(confidence: NDArray[np.floating], right: NDArray[np.bool_]) -> Bin:
+    return Bin(float(confidence.min()), float(confidence.max()), float(confidence.mean()), 100 * float(right.mean()), len(right))
 
 
 def judge(job: Job) -> Judged | None:
