@@ -62,7 +62,7 @@ FILE_CALLS = {
 }
 FILE_ATTRIBUTES = {("np", "load"), ("np", "save"), ("torch", "load"), ("torch", "save"), ("json", "load"), ("json", "dump")}
 WEIGHTS = ROOT / "core" / "backbones"
-STATISTICS = ROOT / "core" / "calibration.py"
+STATISTICS = (ROOT / "core" / "calibration.py", ROOT / "core" / "confidence.py")
 """Reads the figures that ship."""
 """The only place of core/ that touches files: weights come from a cache."""
 
@@ -152,7 +152,7 @@ def test_core_touches_no_files_but_weights() -> None:
     wrong = [
         f"{module_name(path)}:{node.lineno} calls {ast.unparse(node.func)}"
         for path in modules("core")
-        if not path.is_relative_to(WEIGHTS) and path != STATISTICS
+        if not path.is_relative_to(WEIGHTS) and path not in STATISTICS
         for node in ast.walk(ast.parse(path.read_text()))
         if isinstance(node, ast.Call) and _touches_files(node.func)
     ]
