@@ -63,7 +63,7 @@ FILE_CALLS = {
 FILE_ATTRIBUTES = {("np", "load"), ("np", "save"), ("torch", "load"), ("torch", "save"), ("json", "load"), ("json", "dump")}
 WEIGHTS = ROOT / "core" / "backbones"
 STATISTICS = (ROOT / "core" / "calibration.py", ROOT / "core" / "confidence.py")
-"""Reads the figures that ship."""
+"""Read the figures that ship."""
 """The only place of core/ that touches files: weights come from a cache."""
 
 Import = tuple[str, bool]
