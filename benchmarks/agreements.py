@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-import core
+from benchmarks.cached import code_hash, write
 from benchmarks.encoded import read_encoded
 from benchmarks.parallel import map_jobs
 from core.backbones.weights import cache_folder
@@ -37,6 +37,7 @@ SOURCES = (
     "correspond.py",
     "dense.py",
     "descriptors.py",
+    "discriminant.py",
     "estimators/*.py",
     "hypotheses.py",
     "matched_pair.py",
@@ -64,10 +65,9 @@ def agreements(files: Sequence[Path], whitening: Whitening | None, folder: Path 
     """Agreement of reference i with burst j for the encodings in `files`, shape (N, N); NaN on the diagonal and where there is no depth."""
     root = folder or cache_folder() / "agreements"
     names = hashlib.sha256("\n".join(file.stem for file in files).encode()).hexdigest()[:16]
-    jobs = [Job(tuple(files), j, whitening, root / f"{_code_hash()}-{names}-{file.stem}.npy") for j, file in enumerate(files)]
+    jobs = [Job(tuple(files), j, whitening, root / f"{code_hash(SOURCES)[:16]}-{names}-{file.stem}.npy") for j, file in enumerate(files)]
     missing = [job for job in jobs if not job.row.exists()]
     if missing:
-        root.mkdir(parents=True, exist_ok=True)
         map_jobs(compute_row, missing, lambda job: len(job.files) - 1, "verifying by pose")
     return np.stack([np.load(job.row) for job in jobs], axis=1)
 
@@ -85,10 +85,7 @@ def compute_row(job: Job) -> None:
             row[i] = agreement(reference, target, estimator.estimate(reference, target).target_from_reference, job.whitening)
         except OneLookError:  # no pose: nothing of the reference is found in the burst
             row[i] = 0.0
-    partial = job.row.with_suffix(".partial")
-    with partial.open("wb") as stream:
-        np.save(stream, row)
-    partial.replace(job.row)
+    write(job.row, lambda stream: np.save(stream, row))
 
 
 def few_views(burst: EncodedBurst) -> EncodedBurst:
@@ -104,10 +101,3 @@ def _reference(file: Path) -> Reference | None:
         return build_reference(few_views(read_encoded(file)))
     except OneLookError:  # no depth, or one view only
         return None
-
-
-@cache
-def _code_hash() -> str:
-    root = Path(core.__file__).parent
-    sources = [source for pattern in SOURCES for source in sorted(root.glob(pattern))]
-    return hashlib.sha256(b"\0".join(source.read_bytes() for source in sources)).hexdigest()[:16]

@@ -7,17 +7,15 @@ encoder's configuration, and the source of the code that encodes. It is plain ar
 from __future__ import annotations
 
 import hashlib
-import os
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-import core
+from benchmarks.cached import code_hash, write
 from benchmarks.parallel import bar
 from clients.datasets import folders
 from core.backbones.weights import cache_folder
@@ -55,19 +53,12 @@ def read_encoded(file: Path) -> EncodedBurst:
 
 
 def _key(sequence: folders.Sequence, encoder: Encoder) -> str:
-    digest = hashlib.sha256(f"{encoder.backbone.fingerprint} {encoder.config} {_code_hash()}".encode())
+    digest = hashlib.sha256(f"{encoder.backbone.fingerprint} {encoder.config} {code_hash(SOURCES)}".encode())
     digest.update(sequence.reader.cameras(sequence).encode())
     for file in sequence.reader.files(sequence):
         if file.exists():
             digest.update(f"{file.relative_to(sequence.path)}\0".encode() + hashlib.sha256(file.read_bytes()).digest())
     return digest.hexdigest()[:32]
-
-
-@cache
-def _code_hash() -> str:
-    root = Path(core.__file__).parent
-    sources = [source for pattern in SOURCES for source in sorted(root.glob(pattern))]
-    return hashlib.sha256(b"\0".join(source.read_bytes() for source in sources)).hexdigest()
 
 
 def _write(file: Path, encoded: EncodedBurst) -> None:
@@ -76,8 +67,4 @@ def _write(file: Path, encoded: EncodedBurst) -> None:
         "stages": np.array(list(encoded.stage_ms), dtype=np.str_),
         "stage_ms": np.array(list(encoded.stage_ms.values()), dtype=float),
     }
-    file.parent.mkdir(parents=True, exist_ok=True)
-    partial = file.with_suffix(f".{os.getpid()}.partial")
-    with partial.open("wb") as stream:
-        np.savez(stream, allow_pickle=False, **arrays)
-    partial.replace(file)
+    write(file, lambda stream: np.savez(stream, allow_pickle=False, **arrays))

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-import core
+from benchmarks.cached import code_hash, write
 from benchmarks.parallel import bar
 from core.backbones.weights import cache_folder
 from core.backbones.whitening import Whitening
@@ -33,7 +33,6 @@ def matches(bursts: Sequence[EncodedBurst], whitening: Whitening | None, folder:
     patches = [whitened(sample_patches(burst), whitening) for burst in bursts]
     file = (folder or cache_folder() / "matches") / f"{_key(patches)}.npy"
     if not file.exists():
-        file.parent.mkdir(parents=True, exist_ok=True)
         order = np.random.default_rng(0).permutation(len(patches))
         adaptations = [
             Adaptation.fit([patches[index] for index in order[:count]]) if count else Adaptation.none(patches[0].shape[-1])
@@ -42,10 +41,7 @@ def matches(bursts: Sequence[EncodedBurst], whitening: Whitening | None, folder:
         with bar() as progress:
             task = progress.add_task("matching patches", total=len(adaptations) * len(patches))
             table = np.stack([_table(patches, each, lambda: progress.advance(task)) for each in adaptations])
-        partial = file.with_suffix(".partial")
-        with partial.open("wb") as stream:
-            np.save(stream, table)
-        partial.replace(file)
+        write(file, lambda stream: np.save(stream, table))
     return np.asarray(np.load(file))
 
 
@@ -59,7 +55,7 @@ def _table(patches: list[FloatArray], adaptation: Adaptation, advance: Callable[
 
 
 def _key(patches: list[FloatArray]) -> str:
-    digest = hashlib.sha256((Path(core.__file__).parent / "evidence.py").read_bytes() + repr(STAGES).encode())
+    digest = hashlib.sha256(f"{code_hash(('evidence.py',))} {STAGES}".encode())
     for each in patches:
         digest.update(each.tobytes())
     return digest.hexdigest()[:32]
