@@ -23,7 +23,7 @@ ABOVE_PLANE = 0.03
 MAX_HEIGHT = 1.5
 """Higher than this above the support is another surface."""
 FAR_BACKGROUND = 1.6
-"""Background more than this many times as far as the object says nothing of its support."""
+"""What is more than this many times as far as the object says nothing of its support, and is no part of it."""
 PLANE_VOTE = 0.3
 """Probability that being off or on the support adds or takes."""
 SMOOTHING = 7
@@ -54,13 +54,14 @@ def vote_by_support(soft: FloatArray, points_m: FloatArray, usable: Mask, width_
     if not likely.any():
         return soft
     reach = FAR_BACKGROUND * np.median(points_m[likely][:, 2])
-    background = points_m[usable & (soft < threshold) & (points_m[..., 2] < reach)]
+    near = usable & (points_m[..., 2] < reach)
+    background = points_m[near & (soft < threshold)]
     if len(background) < MIN_PLANE_POINTS:
         return soft
     normal, origin = fit_plane(background, PLANE_TOLERANCE * width_m)
     height = (points_m - origin) @ normal / width_m
-    on_support = usable & (np.abs(height) < ON_PLANE)
-    above = usable & (height > ABOVE_PLANE) & (height < MAX_HEIGHT)
+    on_support = near & (np.abs(height) < ON_PLANE)
+    above = near & (height > ABOVE_PLANE) & (height < MAX_HEIGHT)
     voted = np.clip(soft + PLANE_VOTE * above - PLANE_VOTE * on_support, 0, 1)
     smooth = cv2.medianBlur((voted * 255).astype(np.uint8), SMOOTHING)
     return np.asarray(smooth, dtype=np.float32) / 255

@@ -31,6 +31,18 @@ def test_unsure_parts_of_the_object_are_raised_over_the_support() -> None:
     assert voted[~inside].mean() < 0.2
 
 
+def test_a_wall_far_behind_is_not_raised_though_it_is_above_the_support() -> None:
+    x, y = np.meshgrid(np.linspace(-0.5, 0.5, 64), np.linspace(-0.3, 0.5, 64))
+    table, inside = y > 0.2, (np.abs(x) < 0.15) & (y > -0.05) & (y < 0.2)
+    depth = np.where(table, 0.2 / np.maximum(y, 0.2), np.where(inside, 1.0, 3.0))
+    points = np.stack([x * depth, y * depth, depth], axis=-1)
+    wall = ~table & ~inside
+    soft = np.where(inside, 0.6, 0.3)
+    voted = vote_by_support(soft, points, np.ones_like(inside), 1.0)
+    assert voted[inside].mean() > 0.8
+    assert voted[wall].mean() < 0.35
+
+
 def test_without_usable_depth_nothing_changes() -> None:
     points, inside = scene()
     soft = inside.astype(float)
