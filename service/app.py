@@ -16,6 +16,7 @@ from core.backbones.dino import load_backbone
 from service import errors, openapi
 from service.agent import Agent, AgentConfig
 from service.batching import BatchingBackbone
+from service.console.install import install as install_console
 from service.events import Events
 from service.limits import UploadLimit
 from service.metrics import Measured, Metrics
@@ -66,6 +67,7 @@ def create_app(settings: Settings, *, backbone: Backbone | None = None) -> FastA
     for router in routers:
         app.include_router(router)
     openapi.install(app, [route for router in routers for route in router.routes])
+    install_console(app)
     app.state.made = observations.MADE | scans.MADE | categories.MADE | goals.MADE | memory.MADE
     return app
 

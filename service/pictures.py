@@ -64,6 +64,16 @@ def encode_png(picture: Picture) -> bytes:
     return bytes(cv2.imencode(".png", cv2.cvtColor(picture, cv2.COLOR_RGB2BGR))[1])
 
 
+def at_most(picture: Picture, side: int) -> Picture:
+    """Reduced to so many pixels of the longer side; never enlarged."""
+    height, width = picture.shape[:2]
+    share = side / max(height, width)
+    if share >= 1:
+        return picture
+    size = (max(1, round(width * share)), max(1, round(height * share)))
+    return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+
+
 def depth_picture(depth_m: NDArray[np.float32]) -> Picture:
     """Near is bright, far is dark; what was not measured is filled in at half brightness."""
     measured = depth_m > 0

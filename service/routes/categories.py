@@ -9,7 +9,7 @@ from fastapi import APIRouter, Path, Response
 from service.deps import ActorDep, AgentDep, WorkDep
 from service.exchange import MemoryRoute
 from service.gallery import CategoryGallery
-from service.routes.png import PNG_RESPONSES, png
+from service.routes.png import PNG_RESPONSES, Side, png
 from service.routes.scans import category
 from service.schemas.categories import (
     Category,
@@ -84,45 +84,45 @@ def category_similarity(category_id: str, agent: AgentDep) -> CategorySimilariti
 
 
 @router.get("/{category_id}/views/{view}/rgb.png", response_class=Response, responses=PNG_RESPONSES)
-def category_rgb(category_id: str, view: View, agent: AgentDep) -> Response:
+def category_rgb(category_id: str, view: View, agent: AgentDep, side: Side = None) -> Response:
     """A reference view."""
-    return png(CategoryGallery(agent, category_id).rgb(view))
+    return png(CategoryGallery(agent, category_id).rgb(view), side)
 
 
 @router.get("/{category_id}/views/{view}/depth.png", response_class=Response, responses=PNG_RESPONSES)
-def category_depth(category_id: str, view: View, agent: AgentDep) -> Response:
+def category_depth(category_id: str, view: View, agent: AgentDep, side: Side = None) -> Response:
     """Its depth for the eye: near is bright, far is dark, not measured is black."""
-    return png(CategoryGallery(agent, category_id).depth(view))
+    return png(CategoryGallery(agent, category_id).depth(view), side)
 
 
 @router.get("/{category_id}/views/{view}/mask.png", response_class=Response, responses=PNG_RESPONSES)
-def category_mask(category_id: str, view: View, agent: AgentDep) -> Response:
+def category_mask(category_id: str, view: View, agent: AgentDep, side: Side = None) -> Response:
     """What of the view is taken for the object: white on it, black elsewhere."""
-    return png(CategoryGallery(agent, category_id).mask(view))
+    return png(CategoryGallery(agent, category_id).mask(view), side)
 
 
 @router.get("/{category_id}/views/{view}/saliency.png", response_class=Response, responses=PNG_RESPONSES)
-def category_saliency(category_id: str, view: View, agent: AgentDep) -> Response:
+def category_saliency(category_id: str, view: View, agent: AgentDep, side: Side = None) -> Response:
     """How much each patch of its close crop stands out: bright is object, dark is background."""
-    return png(CategoryGallery(agent, category_id).saliency(view))
+    return png(CategoryGallery(agent, category_id).saliency(view), side)
 
 
 @router.get("/{category_id}/views/{view}/foreground.png", response_class=Response, responses=PNG_RESPONSES)
-def category_foreground(category_id: str, view: View, agent: AgentDep) -> Response:
+def category_foreground(category_id: str, view: View, agent: AgentDep, side: Side = None) -> Response:
     """Its close crop with everything dimmed that is not taken for the object."""
-    return png(CategoryGallery(agent, category_id).foreground(view))
+    return png(CategoryGallery(agent, category_id).foreground(view), side)
 
 
 @router.get("/{category_id}/views/{view}/pca.png", response_class=Response, responses=PNG_RESPONSES)
-def category_pca(category_id: str, view: View, agent: AgentDep) -> Response:
+def category_pca(category_id: str, view: View, agent: AgentDep, side: Side = None) -> Response:
     """Its patches coloured by the reference's first three principal components, alike in all views."""
-    return png(CategoryGallery(agent, category_id).pca(view))
+    return png(CategoryGallery(agent, category_id).pca(view), side)
 
 
 @router.get("/{category_id}/views/{view}/overlay.png", response_class=Response, responses=PNG_RESPONSES)
-def category_overlay(category_id: str, view: View, agent: AgentDep) -> Response:
+def category_overlay(category_id: str, view: View, agent: AgentDep, side: Side = None) -> Response:
     """A reference view with the reference's oriented box over it; the object's x, y and z axes are red, green and blue."""
-    return png(CategoryGallery(agent, category_id).overlay(view))
+    return png(CategoryGallery(agent, category_id).overlay(view), side)
 
 
 @router.get(

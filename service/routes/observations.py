@@ -13,7 +13,7 @@ from service.deps import AgentDep, UploadDep, WorkDep
 from service.exchange import MemoryRoute
 from service.features import pose_details_from_arrays
 from service.gallery import ObservationGallery
-from service.routes.png import PNG_RESPONSES, png
+from service.routes.png import PNG_RESPONSES, Side, png
 from service.routes.scans import scan_answer
 from service.schemas.bursts import BURST_BODY
 from service.schemas.observations import AnswerQuery, Debug, NewObservationQuery, Observation, ObservationList
@@ -55,27 +55,27 @@ def get_observation(observation_id: str, query: Annotated[AnswerQuery, Query()],
 
 
 @router.get("/{observation_id}/rgb.png", response_class=Response, responses=PNG_RESPONSES)
-def observation_rgb(observation_id: str, agent: AgentDep, view: ViewIndex = 0) -> Response:
+def observation_rgb(observation_id: str, agent: AgentDep, view: ViewIndex = 0, side: Side = None) -> Response:
     """A view as it came."""
-    return png(ObservationGallery(agent, observation_id).rgb(view))
+    return png(ObservationGallery(agent, observation_id).rgb(view), side)
 
 
 @router.get("/{observation_id}/foreground.png", response_class=Response, responses=PNG_RESPONSES)
-def observation_foreground(observation_id: str, agent: AgentDep, view: ViewIndex = 0) -> Response:
+def observation_foreground(observation_id: str, agent: AgentDep, view: ViewIndex = 0, side: Side = None) -> Response:
     """The close crop of a view with everything dimmed that is not taken for the object."""
-    return png(ObservationGallery(agent, observation_id).foreground(view))
+    return png(ObservationGallery(agent, observation_id).foreground(view), side)
 
 
 @router.get("/{observation_id}/pca.png", response_class=Response, responses=PNG_RESPONSES)
-def observation_pca(observation_id: str, agent: AgentDep, view: ViewIndex = 0) -> Response:
+def observation_pca(observation_id: str, agent: AgentDep, view: ViewIndex = 0, side: Side = None) -> Response:
     """The object's patches coloured by their first three principal components: those of its category where it has one, else its own."""
-    return png(ObservationGallery(agent, observation_id).pca(view))
+    return png(ObservationGallery(agent, observation_id).pca(view), side)
 
 
 @router.get("/{observation_id}/overlay.png", response_class=Response, responses=PNG_RESPONSES)
-def observation_overlay(observation_id: str, agent: AgentDep, view: ViewIndex = 0) -> Response:
+def observation_overlay(observation_id: str, agent: AgentDep, view: ViewIndex = 0, side: Side = None) -> Response:
     """A view with the oriented box drawn at the estimated pose; the object's x, y and z axes are red, green and blue."""
-    return png(ObservationGallery(agent, observation_id).overlay(view))
+    return png(ObservationGallery(agent, observation_id).overlay(view), side)
 
 
 @router.get("/{observation_id}/correspondences.png", response_class=Response, responses=PNG_RESPONSES)
@@ -83,9 +83,10 @@ def observation_correspondences(
     observation_id: str,
     agent: AgentDep,
     view: Annotated[int | None, Query(ge=0, description="Which of the burst's views; the pose's `best_view` where left out.")] = None,
+    side: Side = None,
 ) -> Response:
     """The best reference view (left) and a view of the burst (right): inliers coloured by similarity, other correspondences grey."""
-    return png(ObservationGallery(agent, observation_id).correspondences(view))
+    return png(ObservationGallery(agent, observation_id).correspondences(view), side)
 
 
 def _first_views(burst: Burst, count: int | None) -> Burst:

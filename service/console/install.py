@@ -1,0 +1,15 @@
+"""Puts the console into the application."""
+
+from __future__ import annotations
+
+from fastapi import FastAPI
+
+from service.console import now, observations
+from service.console.assets import PREFIX, Assets
+
+
+def install(app: FastAPI) -> None:
+    """Its pages, and the files they need."""
+    for page in (now, observations):
+        app.include_router(page.router)
+    app.mount(PREFIX, Assets(), name="static")

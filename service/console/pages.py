@@ -1,0 +1,98 @@
+"""What every page has in common: its frame, its security headers, and errors that a person can read."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Coroutine
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlencode
+
+from anyio.to_thread import run_sync
+from fastapi import Request, Response
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import HTMLResponse
+from fastapi.routing import APIRoute
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+from core.errors import OneLookError
+from service.console.assets import asset_url
+from service.console.words import FILTERS
+from service.errors import problem_of, validation_problem
+from service.schemas.problem import Problem
+
+TEMPLATES = Path(__file__).parent / "templates"
+HEADERS = {
+    # Everything comes from this service: no inline script or style, nothing evaluated, nothing from elsewhere. Previews of files that
+    # were dropped into a page are blob:.
+    "Content-Security-Policy": "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob:; connect-src 'self'; "
+    "form-action 'self'; base-uri 'none'; frame-ancestors 'none'",
+    "X-Content-Type-Options": "nosniff",
+    "X-Frame-Options": "DENY",
+    "Referrer-Policy": "same-origin",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Cache-Control": "no-cache",
+}
+
+
+@dataclass(frozen=True)
+class Link:
+    """An entry of the navigation."""
+
+    path: str
+    title: str
+
+
+NAVIGATION = (Link("/", "Now"), Link("/observations", "Observations"))
+
+
+def query(**parameters: str | None) -> str:
+    """The end of an address, with those that are given."""
+    given = {name: value for name, value in parameters.items() if value is not None}
+    return f"?{urlencode(given)}" if given else ""
+
+
+def _environment() -> Environment:
+    environment = Environment(
+        loader=FileSystemLoader(TEMPLATES), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    environment.globals.update(navigation=NAVIGATION, asset=asset_url, query=query)
+    environment.filters.update(FILTERS)
+    return environment
+
+
+ENVIRONMENT = _environment()
+
+
+def render(request: Request, template: str, status: int = 200, **context: Any) -> HTMLResponse:
+    """A page, or the part of one that htmx asked for."""
+    path = request.url.path
+    here = next((link.path for link in NAVIGATION if link.path != "/" and path.startswith(link.path)), "/" if path == "/" else None)
+    return HTMLResponse(ENVIRONMENT.get_template(template).render(request=request, here=here, **context), status)
+
+
+class Page(APIRoute):
+    """A route that answers a person's browser: an error becomes a page, or a note within one where htmx asked."""
+
+    def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
+        """FastAPI's, with that around it."""
+        answer: Callable[[Request], Coroutine[Any, Any, Response]] = super().get_route_handler()
+
+        async def page(request: Request) -> Response:
+            try:
+                response = await answer(request)
+            except OneLookError as error:
+                response = await run_sync(_problem, request, problem_of(error))
+            except RequestValidationError as error:
+                response = await run_sync(_problem, request, validation_problem(error.errors()))
+            for name, value in HEADERS.items():
+                response.headers.setdefault(name, value)
+            return response
+
+        return page
+
+
+def _problem(request: Request, problem: Problem) -> Response:
+    template = "problem_note.html" if "hx-request" in request.headers else "problem.html"
+    return render(request, template, problem.status, problem=problem)

@@ -1,0 +1,45 @@
+// What every page does: the theme's button, times in the reader's own zone, notices, and pictures that are not there.
+
+const root = document.documentElement;
+
+document.getElementById("theme").addEventListener("click", () => {
+  const dark = root.dataset.theme ? root.dataset.theme === "dark" : matchMedia("(prefers-color-scheme: dark)").matches;
+  root.dataset.theme = dark ? "light" : "dark";
+  localStorage.setItem("theme", root.dataset.theme);
+  root.dispatchEvent(new CustomEvent("themechange"));
+});
+
+const units = [["day", 86400], ["hour", 3600], ["minute", 60]];
+const relative = new Intl.RelativeTimeFormat("en", { numeric: "auto" });
+const exact = new Intl.DateTimeFormat("en-GB", { dateStyle: "medium", timeStyle: "medium" });
+
+function wordTime(element) {
+  const then = new Date(element.dateTime);
+  const seconds = (Date.now() - then) / 1000;
+  const unit = units.find(([, size]) => seconds >= size);
+  element.textContent = unit ? relative.format(-Math.floor(seconds / unit[1]), unit[0]) : "just now";
+  element.title = exact.format(then);
+}
+
+function wordTimes(within = document) {
+  within.querySelectorAll("time[data-relative]").forEach(wordTime);
+}
+
+wordTimes();
+setInterval(wordTimes, 30_000);
+document.addEventListener("htmx:load", (event) => wordTimes(event.detail.elt));
+
+// A failure to reach the service is told, once, near what was pressed last.
+export function notice(text, bad = false) {
+  const element = document.createElement("p");
+  element.className = bad ? "note bad" : "note";
+  element.textContent = text;
+  document.getElementById("notices").replaceChildren(element);
+  setTimeout(() => element.remove(), 6000);
+}
+
+document.addEventListener("htmx:sendError", () => notice("The service cannot be reached.", true));
+document.addEventListener("htmx:afterRequest", (event) => {
+  const told = event.detail.xhr?.getResponseHeader("X-Notice");
+  if (told) notice(decodeURIComponent(told));
+});
