@@ -25,7 +25,7 @@ from clients.calls import curating, observing, operating, rearranging, scanning
 from clients.calls.call import Call
 from clients.events import PATH as EVENTS
 from clients.events import Event, EventReader
-from clients.exchange import Retry, Wait, broken, connection_to, endless, exchange, problem_of
+from clients.exchange import Retry, Wait, authorization, broken, connection_to, endless, exchange, key_header, problem_of
 from clients.robot import CONNECT_TIMEOUT_S, DEFAULT_URL, TIMEOUT_S, timeouts, with_self
 from clients.tracking import MAX_MESSAGE_BYTES, Conversation, Tracked, websocket_url
 from core.views import Burst, View
@@ -92,10 +92,19 @@ class AsyncRobotClient:
     """Talks to one service. Every method raises what is in `clients.errors`; a context manager closes its connections."""
 
     def __init__(
-        self, url: str = DEFAULT_URL, *, timeout_s: float = TIMEOUT_S, retry: Retry | None = None, http: httpx.AsyncClient | None = None
+        self,
+        url: str = DEFAULT_URL,
+        *,
+        api_key: str | None = None,
+        timeout_s: float = TIMEOUT_S,
+        retry: Retry | None = None,
+        http: httpx.AsyncClient | None = None,
     ) -> None:
-        """`http` replaces the connection (a test client, another transport); `url` and `timeout_s` are then its own."""
-        self._http = http or httpx.AsyncClient(base_url=url, timeout=timeouts(timeout_s))
+        """`api_key` is what `onelook keys create` told; the variable ONELOOK_API_KEY where it is left out.
+
+        `http` replaces the connection (a test client, another transport); the others but `retry` are then its own.
+        """
+        self._http = http or httpx.AsyncClient(base_url=url, timeout=timeouts(timeout_s), headers=key_header(api_key))
         self._retry = retry or Retry()
 
     async def __aenter__(self) -> AsyncRobotClient:
@@ -175,14 +184,16 @@ class AsyncRobotClient:
 
     def track(self, category_id: str | None = None, **options: Any) -> AsyncTrack:
         """As `RobotClient.track`: `async with robot.track() as track: tracked = await track.step(view)`."""
-        return AsyncTrack(websocket_url(str(self._http.base_url)), {"category_id": category_id, **options})
+        url = websocket_url(str(self._http.base_url))
+        return AsyncTrack(url, {"category_id": category_id, **options}, authorization(self._http.headers))
 
 
 class AsyncTrack:
     """A connection that follows one object; an asynchronous context manager."""
 
-    def __init__(self, url: str, options: Mapping[str, Any]) -> None:
+    def __init__(self, url: str, options: Mapping[str, Any], headers: Mapping[str, str]) -> None:
         self._url = url
+        self._headers = headers
         self._talk = Conversation()
         self._hello = self._talk.hello(**options)
         self._open = AsyncExitStack()
@@ -191,7 +202,7 @@ class AsyncTrack:
         """Raises Unreachable, or the ServiceProblem that the service answers."""
         with connection_to(self._url):
             async with AsyncExitStack() as opening:
-                opened = connect(self._url, max_size=MAX_MESSAGE_BYTES, open_timeout=CONNECT_TIMEOUT_S)
+                opened = connect(self._url, additional_headers=self._headers, max_size=MAX_MESSAGE_BYTES, open_timeout=CONNECT_TIMEOUT_S)
                 self._socket = await opening.enter_async_context(opened)
                 await self._socket.send(self._hello)
                 self._talk.read(await self._socket.recv())

@@ -12,6 +12,9 @@ OneLookError
         ├── NotFoundProblem
         ├── ConflictProblem
         ├── UnavailableProblem
+        ├── NoKeyProblem
+        ├── NotAllowedProblem
+        ├── TooOftenProblem
         └── UnexpectedProblem
 """
 
@@ -78,6 +81,18 @@ class UnavailableProblem(ServiceProblem):
     """Something the service needs is missing or busy."""
 
 
+class NoKeyProblem(ServiceProblem):
+    """The service asks for a key, and got none that is valid: give `api_key`, or set ONELOOK_API_KEY."""
+
+
+class NotAllowedProblem(ServiceProblem):
+    """The key's role does not allow this."""
+
+
+class TooOftenProblem(ServiceProblem):
+    """The key's requests are used up for now; `retry_after_s` says for how long."""
+
+
 class UnexpectedProblem(ServiceProblem):
     """The service failed in a way it did not expect; its log says where."""
 
@@ -92,6 +107,9 @@ PROBLEMS: Mapping[str, type[ServiceProblem]] = {
         "not-found": NotFoundProblem,
         "conflict": ConflictProblem,
         "unavailable": UnavailableProblem,
+        "no-key": NoKeyProblem,
+        "not-allowed": NotAllowedProblem,
+        "too-often": TooOftenProblem,
         "unexpected": UnexpectedProblem,
     }.items()
 }

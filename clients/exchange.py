@@ -9,6 +9,7 @@ the service knows a request that it has already carried out.
 from __future__ import annotations
 
 import math
+import os
 import random
 import uuid
 from collections.abc import Generator, Iterator, Mapping
@@ -19,13 +20,14 @@ from email.utils import parsedate_to_datetime
 from typing import Any, TypeVar
 
 import httpx
-from websockets.exceptions import WebSocketException
+from websockets.exceptions import InvalidStatus, WebSocketException
 
 from clients.calls.call import Call
 from clients.errors import ServiceProblem, TooSlow, Unreachable, problem_from_json
 
 T = TypeVar("T")
 KEY = "Idempotency-Key"
+KEY_VARIABLE = "ONELOOK_API_KEY"
 TRY_AGAIN = frozenset({429, 502, 503, 504})
 """Statuses of a service, or a proxy before it, that is busy or restarting; any other one is asked again only if it has Retry-After."""
 PROBLEM = "application/problem+json"
@@ -128,11 +130,27 @@ def broken(why: Exception, url: str) -> Unreachable:
     return Unreachable(f"the connection to {url} broke ({why}); look at the service's log")
 
 
+def key_header(api_key: str | None) -> dict[str, str]:
+    """The header that a key travels in; the environment's key where None is given, no header where it has none either."""
+    key = os.environ.get(KEY_VARIABLE) if api_key is None else api_key
+    return {"Authorization": f"Bearer {key}"} if key else {}
+
+
+def authorization(headers: httpx.Headers) -> dict[str, str]:
+    """That header of a connection, for another one to the same service."""
+    return {"Authorization": headers["Authorization"]} if "Authorization" in headers else {}
+
+
 @contextmanager
 def connection_to(url: str) -> Iterator[None]:
-    """Makes what is wrong with a WebSocket Unreachable."""
+    """Makes what is wrong with a WebSocket Unreachable, and a refusal the ServiceProblem that it tells of."""
     try:
         yield
+    except InvalidStatus as error:
+        refused = error.response
+        raise problem_of(
+            httpx.Response(refused.status_code, headers=list(refused.headers.raw_items()), content=bytes(refused.body))
+        ) from error
     except (OSError, WebSocketException) as error:
         raise Unreachable(f"no connection to {url} ({error}); start the service with `onelook serve`, or give its address") from error
 

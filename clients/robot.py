@@ -29,7 +29,7 @@ from clients.calls import curating, observing, operating, rearranging, scanning
 from clients.calls.call import Call
 from clients.events import PATH as EVENTS
 from clients.events import Event, EventReader
-from clients.exchange import Retry, Wait, broken, connection_to, endless, exchange, problem_of
+from clients.exchange import Retry, Wait, authorization, broken, connection_to, endless, exchange, key_header, problem_of
 from clients.tracking import MAX_MESSAGE_BYTES, Conversation, Tracked, websocket_url
 from core.views import Burst, View
 
@@ -108,10 +108,19 @@ class RobotClient:
     """Talks to one service. Every method raises what is in `clients.errors`; a context manager closes its connections."""
 
     def __init__(
-        self, url: str = DEFAULT_URL, *, timeout_s: float = TIMEOUT_S, retry: Retry | None = None, http: httpx.Client | None = None
+        self,
+        url: str = DEFAULT_URL,
+        *,
+        api_key: str | None = None,
+        timeout_s: float = TIMEOUT_S,
+        retry: Retry | None = None,
+        http: httpx.Client | None = None,
     ) -> None:
-        """`http` replaces the connection (a test client, another transport); `url` and `timeout_s` are then its own."""
-        self._http = http or httpx.Client(base_url=url, timeout=timeouts(timeout_s))
+        """`api_key` is what `onelook keys create` told; the variable ONELOOK_API_KEY where it is left out.
+
+        `http` replaces the connection (a test client, another transport); the others but `retry` are then its own.
+        """
+        self._http = http or httpx.Client(base_url=url, timeout=timeouts(timeout_s), headers=key_header(api_key))
         self._retry = retry or Retry()
 
     def __enter__(self) -> RobotClient:
@@ -199,14 +208,16 @@ class RobotClient:
             for view in camera:
                 tracked = track.step(view)
         """
-        return Track(websocket_url(str(self._http.base_url)), {"category_id": category_id, **options})
+        url = websocket_url(str(self._http.base_url))
+        return Track(url, {"category_id": category_id, **options}, authorization(self._http.headers))
 
 
 class Track:
     """A connection that follows one object; a context manager."""
 
-    def __init__(self, url: str, options: Mapping[str, Any]) -> None:
+    def __init__(self, url: str, options: Mapping[str, Any], headers: Mapping[str, str]) -> None:
         self._url = url
+        self._headers = headers
         self._talk = Conversation()
         self._hello = self._talk.hello(**options)
         self._open = ExitStack()
@@ -214,7 +225,9 @@ class Track:
     def __enter__(self) -> Track:
         """Raises Unreachable, or the ServiceProblem that the service answers."""
         with ExitStack() as opening, connection_to(self._url):
-            self._socket = opening.enter_context(connect(self._url, max_size=MAX_MESSAGE_BYTES, open_timeout=CONNECT_TIMEOUT_S))
+            self._socket = opening.enter_context(
+                connect(self._url, additional_headers=self._headers, max_size=MAX_MESSAGE_BYTES, open_timeout=CONNECT_TIMEOUT_S)
+            )
             self._socket.send(self._hello)
             self._talk.read(self._socket.recv())
             self._open = opening.pop_all()

@@ -15,7 +15,9 @@ from core.backbones.base import Backbone
 from core.backbones.dino import load_backbone
 from service import errors, openapi
 from service.agent import Agent, AgentConfig
+from service.auth import Guard
 from service.batching import BatchingBackbone
+from service.browsers import OwnPagesOnly
 from service.console.install import install as install_console
 from service.events import Events
 from service.limits import UploadLimit
@@ -34,8 +36,11 @@ PRUNE_EVERY_S = 3600
 log = logging.getLogger("onelook")
 
 
-def create_app(settings: Settings, *, backbone: Backbone | None = None) -> FastAPI:
-    """The service with these settings; it opens its memory and loads its backbone (unless one is given) when it starts."""
+def create_app(settings: Settings, *, backbone: Backbone | None = None, asks: bool = True) -> FastAPI:
+    """The service with these settings; it opens its memory and loads its backbone (unless one is given) when it starts.
+
+    `asks` is False where nobody but this process reaches it: then it asks for no key.
+    """
 
     metrics = Metrics()
 
@@ -43,6 +48,7 @@ def create_app(settings: Settings, *, backbone: Backbone | None = None) -> FastA
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         with open_agent(settings, backbone, metrics) as agent:
             app.state.agent = agent
+            app.state.guard = Guard(agent.memory.keys, agent.memory.sessions, settings.rate_limit, asks=asks)
             app.state.work = work = WorkQueue(settings.workers, settings.queue)
             metrics.watch_work(lambda: work.pending)
             async with anyio.create_task_group() as tasks:
@@ -61,6 +67,7 @@ def create_app(settings: Settings, *, backbone: Backbone | None = None) -> FastA
     app.state.metrics = metrics
     app.state.tracks = 0
     app.add_middleware(UploadLimit, max_mb=settings.max_upload_mb)
+    app.add_middleware(OwnPagesOnly)
     app.add_middleware(Measured, metrics=metrics)
     errors.install(app)
     routers = (observations.router, scans.router, categories.router, goals.router, memory.router, memory.live, track.router, health.router)
@@ -83,7 +90,7 @@ async def _keep_pruned(memory: Memory) -> None:
 def open_agent(settings: Settings, backbone: Backbone | None, metrics: Metrics) -> Iterator[Agent]:
     """The agent of these settings, with its memory open until the end; loads its backbone unless one is given.
 
-    Raises what `Settings.require_safe`, `Memory.open`, `load_backbone` and `Agent` raise.
+    Raises what `Settings`, `Memory.open`, `load_backbone` and `Agent` raise.
     """
     with _checked(settings, backbone) as (opened, loaded, config):
         agent = Agent(BatchingBackbone(loaded, metrics.count_pass), opened, config, Events(metrics.count_event))
@@ -103,8 +110,9 @@ def checked_backbone(settings: Settings) -> Backbone:
 @contextmanager
 def _checked(settings: Settings, backbone: Backbone | None = None) -> Iterator[tuple[Memory, Backbone, AgentConfig]]:
     """What is wrong with the settings is told before a backbone is loaded, which takes long."""
-    settings.require_safe()
+    settings.require_consistent()
     config = AgentConfig(settings.score, settings.threshold, settings.variant, settings.scan_views, settings.false_known_rate)
     config.validate()
     with Memory.open(settings.data_dir, settings.retention) as opened:
+        settings.require_safe(len(opened.keys.all()))
         yield opened, backbone or load_backbone(settings.backbone, device=settings.device, report=log.info), config

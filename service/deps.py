@@ -17,6 +17,7 @@ from starlette.formparsers import MultiPartException, MultiPartParser
 from core.errors import InvalidInput
 from core.views import Burst
 from service.agent import Agent
+from service.auth import Caller
 from service.decoding import Parts, Upload, decode_parts
 from service.npz import decode_npz
 from service.settings import Settings
@@ -34,6 +35,22 @@ def _agent(request: Request) -> Agent:
 def _work(request: Request) -> WorkQueue:
     work: WorkQueue = request.app.state.work
     return work
+
+
+def _actor(
+    request: Request,
+    said: Annotated[
+        str | None,
+        Header(
+            alias="X-Actor",
+            min_length=1,
+            max_length=200,
+            description="Who asks; kept in the audit trail, after the name of their key where there is one. Never checked.",
+        ),
+    ] = None,
+) -> str | None:
+    caller: Caller = request.state.caller
+    return caller.as_actor(said)
 
 
 def media_type(request: Request) -> str:
@@ -118,7 +135,5 @@ async def _burst_part(form: FormData) -> str | bytes:
 
 AgentDep = Annotated[Agent, Depends(_agent)]
 WorkDep = Annotated[WorkQueue, Depends(_work)]
-ActorDep = Annotated[
-    str | None, Header(alias="X-Actor", min_length=1, max_length=200, description="Who asks; kept in the audit trail, never checked.")
-]
+ActorDep = Annotated[str | None, Depends(_actor)]
 UploadDep = Annotated[Upload, Depends(read_upload)]

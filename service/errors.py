@@ -12,6 +12,7 @@ from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
 
 from core import errors as core
+from service.auth import NoKey, NotAllowed, TooOften
 from service.schemas.problem import MEDIA_TYPE, FieldError, Problem
 from service.work import Busy
 from store.requests import StillRunning
@@ -24,6 +25,9 @@ KINDS: tuple[tuple[type[core.OneLookError], int, str, str], ...] = (
     (core.NotFound, 404, "not-found", "There is no such thing"),
     (core.Conflict, 409, "conflict", "Its state does not allow this"),
     (core.Unavailable, 503, "unavailable", "Something the service needs is missing or busy"),
+    (NoKey, 401, "no-key", "A key is missing, or not valid"),
+    (NotAllowed, 403, "not-allowed", "This takes another role"),
+    (TooOften, 429, "too-often", "The key was used too often"),
 )
 """The first kind that an error is an instance of says its status, type and title."""
 
@@ -50,8 +54,20 @@ def problem_of(error: core.OneLookError) -> Problem:
 
 def _on_onelook_error(request: Request, error: Exception) -> JSONResponse:
     assert isinstance(error, core.OneLookError)
-    wait_s = error.retry_after_s if isinstance(error, Busy) else STILL_RUNNING_S if isinstance(error, StillRunning) else None
-    return _answer(problem_of(error), None if wait_s is None else {"Retry-After": str(wait_s)})
+    return problem_answer(error)
+
+
+def problem_answer(error: core.OneLookError) -> JSONResponse:
+    """The answer that tells of `error`."""
+    return _answer(problem_of(error), _headers(error))
+
+
+def _headers(error: core.OneLookError) -> dict[str, str]:
+    if isinstance(error, (Busy, TooOften)):
+        return {"Retry-After": str(error.retry_after_s)}
+    if isinstance(error, StillRunning):
+        return {"Retry-After": str(STILL_RUNNING_S)}
+    return {"WWW-Authenticate": 'Bearer realm="onelook"'} if isinstance(error, NoKey) else {}
 
 
 def _on_validation_error(request: Request, error: Exception) -> JSONResponse:

@@ -3,34 +3,30 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Coroutine
-from typing import Any
 
 from anyio.to_thread import run_sync
 from fastapi import Request, Response
-from fastapi.routing import APIRoute
 
 from core.errors import InvalidInput
 from service.agent import Agent
+from service.auth import Answer, GuardedRoute
 from store.requests import Earlier, Reply
 
-Answer = Callable[[Request], Coroutine[Any, Any, Response]]
 KEY = "Idempotency-Key"
 LONGEST_KEY = 200
 REPEATED = "Idempotency-Replayed"
 """Header of an answer that was given before."""
 
 
-class MemoryRoute(APIRoute):
+class MemoryRoute(GuardedRoute):
     """A route that reads or changes the memory.
 
     A GET is answered with an ETag that the memory's version gives, and with 304 where the caller has that version already. A POST with
     an Idempotency-Key is carried out once: its repetitions get the first answer again.
     """
 
-    def get_route_handler(self) -> Answer:
-        """FastAPI's, with that around it."""
-        answer: Answer = super().get_route_handler()
+    def around(self, answer: Answer) -> Answer:
+        """That."""
         methods = self.methods or set()
 
         async def exchange(request: Request) -> Response:
@@ -50,7 +46,7 @@ async def _conditional(request: Request, answer: Answer) -> Response:
     known = {each.strip() for each in request.headers.get("if-none-match", "").split(",")}
     response = Response(status_code=304) if known & {tag, "*"} else await answer(request)
     response.headers["ETag"] = tag
-    response.headers["Cache-Control"] = "no-cache"  # to be kept, and asked for again with If-None-Match
+    response.headers["Cache-Control"] = "private, no-cache"  # to be kept, and asked for again with If-None-Match
     return response
 
 

@@ -8,11 +8,13 @@ from typing import Any
 from fastapi import FastAPI
 from pydantic.json_schema import models_json_schema
 
+from service.access import ACCESS
 from service.exchange import KEY, LONGEST_KEY, MemoryRoute
 from service.schemas.bursts import BurstPart
 from service.schemas.goals import Seen
 from service.schemas.problem import Problem, problems
 from service.schemas.scans import ScanBegin
+from store.keys import Role
 
 MODELS = (BurstPart, Problem, ScanBegin, Seen)
 IF_NONE_MATCH = {
@@ -31,6 +33,12 @@ IDEMPOTENCY_KEY = {
     "description": "Made anew for each request; repeated with it, the request is not done again but answered as the first time.",
     "example": "0b5f1c1e-6a0c-4f0e-9a55-3f1f6f3f6f0d",
 }
+SCHEME = "key"
+KEY_SCHEME = {
+    "type": "http",
+    "scheme": "bearer",
+    "description": "A key that `onelook keys create` made. While a memory never had one, nobody is asked for it.",
+}
 ETAG = {"ETag": {"description": "Changes with the memory.", "schema": {"type": "string"}}}
 
 
@@ -45,9 +53,12 @@ def install(app: FastAPI, routes: list[Any]) -> None:
         document = generate()
         _, definitions = models_json_schema([(model, "validation") for model in MODELS], ref_template="#/components/schemas/{model}")
         document["components"]["schemas"].update(definitions["$defs"])
+        document["components"]["securitySchemes"] = {SCHEME: KEY_SCHEME}
         for method, operation in _operations(document):
             if operation["operationId"] in remembered:
                 _complete(method, operation)
+            if (role := ACCESS[operation["operationId"]]) is not None:
+                _secure(operation, role)
         return document
 
     app.openapi = openapi  # type: ignore[method-assign] # FastAPI's documented way to extend it
@@ -56,6 +67,15 @@ def install(app: FastAPI, routes: list[Any]) -> None:
 def _operations(document: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
     for methods in document["paths"].values():
         yield from methods.items()
+
+
+def _secure(operation: dict[str, Any], role: Role) -> None:
+    """Adds what `GuardedRoute` does to every operation that takes a role."""
+    operation["security"] = [{SCHEME: []}]
+    operation["x-role"] = role
+    operation["description"] = f"{operation['description']}\n\nRole: {role}."
+    for status, response in problems(401, 403, 429).items():
+        operation["responses"].setdefault(str(status), response)
 
 
 def _complete(method: str, operation: dict[str, Any]) -> None:

@@ -24,12 +24,7 @@ class Settings(BaseSettings):
     data_dir: Path = Field(
         default_factory=lambda: user_data_path("onelook") / "memory", description="Folder of the memory; made where it is missing."
     )
-    host: str = Field("127.0.0.1", description="Address to listen on.")
-    trust_network: bool = Field(
-        False,
-        description="Listen on an address that other machines reach, although nobody is asked who they are: only behind a proxy that "
-        "asks, or in a network that is trusted.",
-    )
+    host: str = Field("127.0.0.1", description="Address to listen on; one that other machines reach takes a key (`onelook keys create`).")
     port: int = Field(8000, ge=0, le=65535, description="Port to listen on; 0 takes a free one.")
     backbone: str = Field(EMBEDDED, description="`dinov2-s14`, `dino-s8`, or a folder or hub name of the DINO family.")
     device: str = Field("cpu", description="Torch device of the backbone: `cpu`, `cuda`, `cuda:1`.")
@@ -43,6 +38,8 @@ class Settings(BaseSettings):
     workers: int = Field(2, gt=0, description="Requests that are worked on at once; those that come together share passes of the backbone.")
     queue: int = Field(16, ge=0, description="Requests that may wait; more are answered 503 with Retry-After.")
     max_tracks: int = Field(4, ge=0, description="Objects that are followed at once over WS /v1/track.")
+    rate_limit: int = Field(1200, gt=0, description="Requests a minute with one key; more are answered 429 with Retry-After.")
+    session_h: float = Field(12, gt=0, description="Hours after which somebody who signed in to the console is signed out.")
     backup_dir: Path | None = Field(None, description="Folder that backups are made in; beside the memory where left out.")
     max_views: int = Field(32, gt=0, description="Most views in one burst.")
     scan_views: int = Field(10, ge=2, le=64, description="Viewpoints that a scan asks for.")
@@ -60,18 +57,21 @@ class Settings(BaseSettings):
         """Where backups are made."""
         return self.backup_dir or self.data_dir.with_name(f"{self.data_dir.name}-backups")
 
-    def require_safe(self) -> None:
-        """Raises InvalidInput for settings that would expose or starve the service."""
-        if not (self.trust_network or self._local):
-            raise InvalidInput(
-                "ONELOOK_HOST",
-                f"is {self.host}, which other machines reach, and there is no authentication: listen on 127.0.0.1 behind a proxy that "
-                "has, or set ONELOOK_TRUST_NETWORK=true where everyone on the network may teach and delete",
-            )
+    def require_consistent(self) -> None:
+        """Raises InvalidInput for settings that would starve the service."""
         if self.scan_views > self.max_views:
             raise InvalidInput(
                 "ONELOOK_SCAN_VIEWS",
                 f"asks for {self.scan_views} views of a scan, ONELOOK_MAX_VIEWS takes {self.max_views} in one request; raise it",
+            )
+
+    def require_safe(self, keys: int) -> None:
+        """Raises InvalidInput where other machines would reach a service that has no keys, `keys` being how many are valid."""
+        if not (keys or self._local):
+            raise InvalidInput(
+                "ONELOOK_HOST",
+                f"is {self.host}, which other machines reach, and nobody has a key: make one with `onelook keys create NAME --role admin`, "
+                "or listen on 127.0.0.1",
             )
 
     @property

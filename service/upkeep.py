@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime, timezone
 from pathlib import Path
@@ -51,13 +52,14 @@ class Upkeep:
         kept = self._memory.setting(RATE)
         return self._false_known_rate if kept is None else float(kept)
 
-    def calibrate(self, false_known_rate: float | None) -> Thresholds:
+    def calibrate(self, false_known_rate: float | None, *, actor: str | None = None) -> Thresholds:
         """Keeps a rate with the memory; None goes back to the setting's. Raises Conflict where thresholds are not made of a rate."""
         if self._threshold is not None:
             raise Conflict(f"ONELOOK_THRESHOLD sets the threshold to {self._threshold}; start without it to have it made of a rate")
         if self._score != BEST:
             raise Conflict(f"the score {self._score} has a threshold of its own; ONELOOK_SCORE={BEST} has one that is made of a rate")
         self._memory.keep_setting(RATE, false_known_rate)
+        self._memory.note("calibrate", {RATE: false_known_rate}, actor=actor)
         self._events.publish("memory_calibrated", false_known_rate=self.false_known_rate)
         return self.thresholds()
 
@@ -73,10 +75,18 @@ class Upkeep:
             len(tokens) + len(verified),
         )
 
-    def backup(self, parent: Path) -> Backup:
+    def backup(self, parent: Path, *, actor: str | None = None) -> Backup:
         """Copies the memory, while it is used, to a new folder in `parent`, called by time and version. Raises Conflict and Unavailable."""
         taken_at = datetime.now(timezone.utc).strftime("%Y%m%dT%H%M%S.%fZ")
-        return self._memory.backup(parent / f"{taken_at}-v{self._memory.version}")
+        made = self._memory.backup(parent / f"{taken_at}-v{self._memory.version}")
+        self._memory.note("backup", {"folder": str(made.folder)}, actor=actor)
+        return made
+
+    def export(self, path: Path, category_ids: Sequence[str] | None, *, actor: str | None = None) -> None:
+        """Writes categories, all where None, to a file that does not exist yet. Raises NotFound, Conflict and Unavailable."""
+        made = self._memory.export(path, category_ids)
+        chosen = None if category_ids is None else list(category_ids)
+        self._memory.note("export", {"categories": made.categories, "chosen": chosen}, actor=actor)
 
     def import_archive(self, archive: bytes, *, actor: str | None = None) -> Import:
         """Takes in the categories of another memory. Raises InvalidInput and Conflict, and nothing is taken in then."""

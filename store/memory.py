@@ -12,7 +12,8 @@ from __future__ import annotations
 
 import fcntl
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from io import TextIOWrapper
 from pathlib import Path
 from types import TracebackType
@@ -21,7 +22,7 @@ from typing import Any
 from core.backbones.base import Backbone
 from core.errors import Conflict, NotFound, Unavailable
 from store.archive import Export, export
-from store.audit import Audit
+from store.audit import Audit, record
 from store.backup import Backup, back_up
 from store.categories import Categories
 from store.check import CheckReport, Progress, Sizes, check, sizes
@@ -29,13 +30,15 @@ from store.connection import DATABASE, Connection
 from store.goals import Goals
 from store.imports import Import, import_archive
 from store.instances import Instances
+from store.keys import Keys
 from store.observations import Observations
-from store.records import AuditEntry
+from store.records import AuditEntry, Errand
 from store.reembed import Features, Reembedded, reembed
 from store.requests import Requests
 from store.retention import Retention
 from store.scans import Scans
 from store.schema import outdated
+from store.sessions import Sessions
 from store.sweep import purge, seal, sweep
 from store.undo import undo
 
@@ -54,6 +57,8 @@ class Memory:
         self.goals = Goals(connection, self.categories)
         self.requests = Requests(connection)
         self.audit = Audit(connection)
+        self.keys = Keys(connection)
+        self.sessions = Sessions(connection)
 
     @classmethod
     def open(cls, folder: Path, retention: Retention | None = None) -> Memory:
@@ -91,6 +96,21 @@ class Memory:
         if outdated(folder / DATABASE):
             cls.open(folder).close()
         return cls(Connection(folder, only_read=True), None)
+
+    @classmethod
+    @contextmanager
+    def keyring(cls, folder: Path) -> Iterator[Keys]:
+        """The keys of the memory in `folder`, to be made and revoked also while a service has it open. Makes an empty memory where none is.
+
+        Raises Conflict where a process of another version has it open, Unavailable where it cannot be written.
+        """
+        if not (folder / DATABASE).is_file() or outdated(folder / DATABASE):
+            cls.open(folder).close()
+        connection = Connection(folder)
+        try:
+            yield Keys(connection)
+        finally:
+            connection.close()
 
     @staticmethod
     def require(folder: Path) -> None:
@@ -136,6 +156,11 @@ class Memory:
         with self._connection.change() as db:
             db.table("meta").insert({"key": f"setting:{name}", "value": json.dumps(value)}, replace=True)
 
+    def note(self, errand: Errand, about: Mapping[str, Any], *, actor: str | None = None) -> None:
+        """Adds to the audit trail what was done with the memory as a whole."""
+        with self._connection.change() as db:
+            record(db, errand, None, {}, about, actor)
+
     def undo(self, entry_id: str, *, actor: str | None = None) -> AuditEntry:
         """Takes back a change of the audit trail; returns the entry that says so.
 
@@ -148,6 +173,7 @@ class Memory:
         self.scans.expire()
         self.observations.prune()
         self.requests.prune()
+        self.sessions.prune()
         purge(self._connection)
 
     def check(self, progress: Progress | None = None) -> CheckReport:

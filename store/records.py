@@ -22,7 +22,11 @@ ScanState = Literal["requested", "collecting", "completed", "expired"]
 Anchor = Literal["center", "base"]
 Assignment = Literal["scan", "decision", "named"]
 """How a burst came to a category: by the scan it was learnt from, by the decision, or by the caller's word."""
-Action = Literal["create", "rename", "merge", "split", "delete", "forget", "import", "reembed", "undo"]
+Change = Literal["create", "rename", "merge", "split", "delete", "forget", "import", "reembed", "undo"]
+"""Of what was learnt."""
+Errand = Literal["calibrate", "backup", "export", "key", "revoke"]
+"""What else only an admin may do; `key` and `revoke` are a key's beginning and end."""
+Action = Literal[Change, Errand]
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,12 +91,12 @@ class Goal:
 
 @dataclass(frozen=True, eq=False)
 class AuditEntry:
-    """One change of what was learnt: who, what, when, and how it was before and after."""
+    """One change of what was learnt, or errand of an admin: who, what, when, and how it was before and after."""
 
     id: str
     created_at: str
     actor: str | None
-    """Who asked for it, as the caller said."""
+    """Who asked for it: the name of their key where there are keys, and what the caller said."""
     action: Action
     category_id: str | None
     """The category that was changed."""

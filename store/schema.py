@@ -189,5 +189,21 @@ def m004_decisions(db: Database) -> None:
     db.table("observations").add_column("viewpoints", str)
 
 
+@migrations()
+def m005_keys(db: Database) -> None:
+    """Who may ask for what, and who signed in."""
+    db.table("keys").create(
+        {"id": str, "name": str, "role": str, "sha256": str, "created_at": str, "revoked_at": str},
+        pk="id",
+        not_null={"name", "role", "sha256", "created_at"},
+    )
+    db.table("sessions").create(
+        {"sha256": str, "key_id": str, "created_at": str, "expires_at": str},
+        pk="sha256",
+        not_null={"key_id", "created_at", "expires_at"},
+        foreign_keys=[_reference("sessions", "key_id", "keys", "CASCADE")],
+    )
+
+
 def _reference(table: str, column: str, other_table: str, on_delete: str) -> ForeignKey:
     return ForeignKey(table, column, other_table, "id", on_delete=on_delete)

@@ -85,11 +85,11 @@ def examine() -> Iterator[Finding]:
         return
     try:
         settings = read_settings({})
-        settings.require_safe()
+        settings.require_consistent()
     except OneLookError as error:
         yield Finding("settings", State.bad, str(error), "set it right in the environment, or leave it out")
         return
-    for check in (device, weights, memory, disk, port):
+    for check in (device, weights, memory, reach, disk, port):
         yield _guarded(check, settings)
 
 
@@ -179,6 +179,18 @@ def memory(settings: Settings) -> Finding:
         remedy = f"set ONELOOK_BACKBONE={made_with}, or another ONELOOK_DATA_DIR, or run: onelook memory reembed"
         return Finding("memory", State.bad, f"{settings.data_dir} was made with {made_with}, not {settings.backbone}", remedy)
     return Finding("memory", State.good, f"{count} categories in {settings.data_dir}; `onelook memory check` reads all of it")
+
+
+def reach(settings: Settings) -> Finding:
+    """Who can ask the service, and whether it asks them who they are."""
+    from store.memory import Memory
+
+    keys = 0
+    if (settings.data_dir / "memory.sqlite3").exists():
+        with Memory.reading(settings.data_dir) as stored:
+            keys = len(stored.keys.all())
+    settings.require_safe(keys)
+    return Finding("reach", State.good, f"{settings.host}, with {keys} keys" if keys else f"{settings.host}, without keys")
 
 
 def disk(settings: Settings) -> Finding:

@@ -54,6 +54,6 @@ def _service_here() -> Iterator[InProcess]:
 
     settings = read_settings({})
     with errors.status("loading the backbone"):
-        app = create_app(settings, backbone=checked_backbone(settings))
+        app = create_app(settings, backbone=checked_backbone(settings), asks=False)
     with start_blocking_portal() as portal, portal.wrap_async_context_manager(app.router.lifespan_context(app)):
         yield InProcess(app, portal)

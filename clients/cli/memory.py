@@ -40,7 +40,7 @@ def info(data_dir: DataDir = None, json: Json = False) -> None:
     """Show how much is in the folder and what it was made with."""
     from store.memory import Memory
 
-    with Memory.reading(_folder(data_dir)) as stored:
+    with Memory.reading(folder_of(data_dir)) as stored:
         facts = {"folder": str(stored.folder), "backbone": stored.backbone, "fingerprint": stored.fingerprint}
         facts |= {"memory_version": stored.version} | asdict(stored.sizes())
     if json:
@@ -54,7 +54,7 @@ def list_categories(data_dir: DataDir = None, json: Json = False) -> None:
     """List the categories in the folder, oldest first."""
     from store.memory import Memory
 
-    with Memory.reading(_folder(data_dir)) as stored:
+    with Memory.reading(folder_of(data_dir)) as stored:
         categories = [asdict(category) for category in stored.categories.all()]
     if json:
         print_json(categories)
@@ -67,7 +67,7 @@ def check(data_dir: DataDir = None, json: Json = False) -> None:
     """Read everything, name what is damaged and what still works; exits with 1 where anything is."""
     from store.memory import Memory
 
-    with Memory.reading(_folder(data_dir)) as stored, progress_of("checking") as progress:
+    with Memory.reading(folder_of(data_dir)) as stored, progress_of("checking") as progress:
         report = stored.check(progress)
     if json:
         print_json(asdict(report) | {"ok": report.ok})
@@ -85,7 +85,7 @@ def backup(
     """Copy the whole memory to a new folder, and read the copy once."""
     from store.memory import Memory
 
-    with Memory.reading(_folder(data_dir)) as stored, progress_of("copying") as progress:
+    with Memory.reading(folder_of(data_dir)) as stored, progress_of("copying") as progress:
         done = stored.backup(folder, progress)
     if json:
         print_json(asdict(done) | {"folder": str(done.folder)})
@@ -104,7 +104,7 @@ def export_categories(
     """Write categories, all where none are named, to one file for another robot's memory."""
     from store.memory import Memory
 
-    with Memory.reading(_folder(data_dir)) as stored, progress_of("exporting") as progress:
+    with Memory.reading(folder_of(data_dir)) as stored, progress_of("exporting") as progress:
         known = stored.categories.all()
         done = stored.export(file, [find(known, which).id for which in category] if category else None, progress)
     if json:
@@ -120,7 +120,7 @@ def import_categories(
     """Take the categories of another memory; those that are there already stay as they are. The service must not run on the folder."""
     from store.memory import Memory
 
-    with Memory.open(_folder(data_dir)) as stored, progress_of("importing") as progress:
+    with Memory.open(folder_of(data_dir)) as stored, progress_of("importing") as progress:
         done = stored.import_archive(file, actor="onelook memory import", progress=progress)
     if json:
         print_json(asdict(done))
@@ -163,7 +163,8 @@ def _row(category: dict[str, Any]) -> dict[str, str]:
     return shown | {"views": str(category["views"]), "instances": str(category["instances"]), "learnt": learnt}
 
 
-def _folder(data_dir: Path | None) -> Path:
+def folder_of(data_dir: Path | None) -> Path:
+    """The one given, else that of the settings."""
     return data_dir or read_settings({}).data_dir
 
 
@@ -171,7 +172,7 @@ def _existing(data_dir: Path | None) -> Path:
     """The same; raises NotFound where no memory is in it."""
     from store.memory import Memory
 
-    folder = _folder(data_dir)
+    folder = folder_of(data_dir)
     Memory.require(folder)
     return folder
 

@@ -40,6 +40,4 @@ class Assets(StaticFiles):
         response = await super().get_response(path, scope)
         named = scope["query_string"].startswith(b"v=")
         response.headers["Cache-Control"] = FOREVER if named else "no-cache"
-        response.headers["X-Content-Type-Options"] = "nosniff"
-        response.headers["Cross-Origin-Resource-Policy"] = "same-origin"
         return response

@@ -1,8 +1,7 @@
-"""What every page has in common: its frame, its security headers, and errors that a person can read."""
+"""What every page has in common: its frame, what a browser may load for it, and errors that a person can read."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Coroutine
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,10 +11,10 @@ from anyio.to_thread import run_sync
 from fastapi import Request, Response
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import HTMLResponse
-from fastapi.routing import APIRoute
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from core.errors import OneLookError
+from service.auth import Answer, GuardedRoute
 from service.console.assets import asset_url
 from service.console.words import FILTERS
 from service.errors import problem_of, validation_problem
@@ -27,12 +26,7 @@ HEADERS = {
     # were dropped into a page are blob:.
     "Content-Security-Policy": "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob:; connect-src 'self'; "
     "form-action 'self'; base-uri 'none'; frame-ancestors 'none'",
-    "X-Content-Type-Options": "nosniff",
-    "X-Frame-Options": "DENY",
-    "Referrer-Policy": "same-origin",
-    "Cross-Origin-Opener-Policy": "same-origin",
-    "Cross-Origin-Resource-Policy": "same-origin",
-    "Cache-Control": "no-cache",
+    "Cache-Control": "private, no-cache",
 }
 
 
@@ -72,12 +66,14 @@ def render(request: Request, template: str, status: int = 200, **context: Any) -
     return HTMLResponse(ENVIRONMENT.get_template(template).render(request=request, here=here, **context), status)
 
 
-class Page(APIRoute):
+class Page(GuardedRoute):
     """A route that answers a person's browser: an error becomes a page, or a note within one where htmx asked."""
 
-    def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
-        """FastAPI's, with that around it."""
-        answer: Callable[[Request], Coroutine[Any, Any, Response]] = super().get_route_handler()
+    kind = "console_"
+
+    def get_route_handler(self) -> Answer:
+        """The guarded one, with that around it."""
+        answer = super().get_route_handler()
 
         async def page(request: Request) -> Response:
             try:

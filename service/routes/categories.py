@@ -41,25 +41,25 @@ def get_category(category_id: str, agent: AgentDep) -> Category:
 
 
 @router.patch("/{category_id}", responses=problems(404, 422, 503))
-def name_category(category_id: str, patch: CategoryPatch, agent: AgentDep, actor: ActorDep = None) -> Category:
+def name_category(category_id: str, patch: CategoryPatch, agent: AgentDep, actor: ActorDep) -> Category:
     """Says what people call it; null takes the name away."""
     return Category.of(agent.curation.rename(category_id, patch.name, actor=actor))
 
 
 @router.delete("/{category_id}", status_code=204, responses=problems(404, 422, 503))
-def delete_category(category_id: str, agent: AgentDep, actor: ActorDep = None) -> None:
+def delete_category(category_id: str, agent: AgentDep, actor: ActorDep) -> None:
     """Forgets it: its reference and every burst assigned to it."""
     agent.curation.delete(category_id, actor=actor)
 
 
 @router.post("/{category_id}/merge", responses=problems(404, 409, 422, 503))
-def merge_category(category_id: str, merge: CategoryMerge, agent: AgentDep, actor: ActorDep = None) -> Category:
+def merge_category(category_id: str, merge: CategoryMerge, agent: AgentDep, actor: ActorDep) -> Category:
     """The bursts of another category join this one, which keeps its reference, name and goals; the other one is gone."""
     return Category.of(agent.curation.merge(merge.source, category_id, actor=actor))
 
 
 @router.post("/{category_id}/split", status_code=201, responses=problems(404, 409, 422, 503))
-async def split_category(category_id: str, split: CategorySplit, agent: AgentDep, work: WorkDep, actor: ActorDep = None) -> Category:
+async def split_category(category_id: str, split: CategorySplit, agent: AgentDep, work: WorkDep, actor: ActorDep) -> Category:
     """Some bursts leave for a new category, whose reference is made of the views of the first of them that allows it."""
     return await work.run(lambda: Category.of(agent.curation.split(category_id, split.instance_ids, split.name, actor=actor)))
 
@@ -72,7 +72,7 @@ def list_instances(category_id: str, agent: AgentDep) -> InstanceList:
 
 
 @router.delete("/{category_id}/instances/{instance_id}", status_code=204, responses=problems(404, 409, 422, 503))
-def delete_instance(category_id: str, instance_id: str, agent: AgentDep, actor: ActorDep = None) -> None:
+def delete_instance(category_id: str, instance_id: str, agent: AgentDep, actor: ActorDep) -> None:
     """Takes a burst out of it, such as one that was recognised wrongly."""
     agent.curation.forget_instance(category_id, instance_id, actor=actor)
 

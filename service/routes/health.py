@@ -6,11 +6,12 @@ from importlib.metadata import version
 
 from fastapi import APIRouter
 
+from service.auth import GuardedRoute
 from service.deps import AgentDep
 from service.schemas.info import Health, Info
 from service.schemas.problem import problems
 
-router = APIRouter(tags=["operations"])
+router = APIRouter(tags=["operations"], route_class=GuardedRoute)
 
 
 @router.get("/healthz")

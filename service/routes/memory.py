@@ -13,6 +13,7 @@ from fastapi.sse import EventSourceResponse, ServerSentEvent
 from starlette.exceptions import HTTPException
 
 from service.agent import Agent
+from service.auth import GuardedRoute
 from service.deps import ActorDep, AgentDep, WorkDep, media_type
 from service.exchange import MemoryRoute
 from service.metrics import Metrics
@@ -21,7 +22,7 @@ from service.schemas.problem import problems
 from service.settings import Settings
 
 router = APIRouter(tags=["memory"], route_class=MemoryRoute)
-live = APIRouter(tags=["memory"])
+live = APIRouter(tags=["memory"], route_class=GuardedRoute)
 """What is new at each call, and so has no ETag."""
 ARCHIVE = "application/zip"
 ARCHIVE_BODY: dict[str, Any] = {"required": True, "content": {ARCHIVE: {"schema": {"type": "string", "format": "binary"}}}}
@@ -34,16 +35,16 @@ def memory(agent: AgentDep) -> MemoryInfo:
 
 
 @router.post("/v1/memory/calibrate", responses=problems(409, 422, 503))
-def calibrate_memory(calibrate: Calibrate, agent: AgentDep) -> Thresholds:
+def calibrate_memory(calibrate: Calibrate, agent: AgentDep, actor: ActorDep) -> Thresholds:
     """Keeps with the memory how many objects of no known category it may call known, and answers the thresholds that this makes."""
-    return Thresholds.of(agent.upkeep.calibrate(calibrate.false_known_rate))
+    return Thresholds.of(agent.upkeep.calibrate(calibrate.false_known_rate, actor=actor))
 
 
-@live.post("/v1/memory/backup", status_code=201, responses=problems(409, 503))
-async def backup_memory(agent: AgentDep, work: WorkDep, request: Request) -> Backup:
+@live.post("/v1/memory/backup", status_code=201, responses=problems(409, 422, 503))
+async def backup_memory(agent: AgentDep, work: WorkDep, request: Request, actor: ActorDep) -> Backup:
     """Copies the whole memory, while it is used, to a new folder in ONELOOK_BACKUP_DIR; the copy opens as a memory."""
     settings: Settings = request.app.state.settings
-    return await work.run(lambda: Backup.of(agent.upkeep.backup(settings.backups)))
+    return await work.run(lambda: Backup.of(agent.upkeep.backup(settings.backups, actor=actor)))
 
 
 @live.post(
@@ -51,12 +52,14 @@ async def backup_memory(agent: AgentDep, work: WorkDep, request: Request) -> Bac
     response_class=Response,
     responses={200: {"description": "An archive", "content": {ARCHIVE: {}}}, **problems(404, 409, 422, 503)},
 )
-async def export_memory(query: Annotated[ExportQuery, Query()], agent: AgentDep, work: WorkDep, after: BackgroundTasks) -> Response:
+async def export_memory(
+    query: Annotated[ExportQuery, Query()], agent: AgentDep, work: WorkDep, after: BackgroundTasks, actor: ActorDep
+) -> Response:
     """Categories, all of them or some, with their references, instances and goals, as one file for another robot's memory."""
     folder = tempfile.TemporaryDirectory()
     path = Path(folder.name) / "memory.zip"
     try:
-        await work.run(lambda: agent.memory.export(path, query.category_id or None))
+        await work.run(lambda: agent.upkeep.export(path, query.category_id or None, actor=actor))
     except BaseException:
         folder.cleanup()
         raise
@@ -65,7 +68,7 @@ async def export_memory(query: Annotated[ExportQuery, Query()], agent: AgentDep,
 
 
 @router.post("/v1/memory/import", status_code=201, responses=problems(409, 413, 415, 422, 503), openapi_extra={"requestBody": ARCHIVE_BODY})
-async def import_memory(request: Request, agent: AgentDep, work: WorkDep, actor: ActorDep = None) -> Import:
+async def import_memory(request: Request, agent: AgentDep, work: WorkDep, actor: ActorDep) -> Import:
     """Takes in the categories of another memory's export: all, or none where anything is wrong; those it has already stay as they are."""
     if media_type(request) != ARCHIVE:
         raise HTTPException(415, f"the body is {media_type(request) or 'of no media type'}; send the file of an export as {ARCHIVE}")
@@ -80,7 +83,7 @@ def list_changes(agent: AgentDep, limit: Annotated[int, Query(ge=1, le=1000, des
 
 
 @router.post("/v1/memory/audit/{entry_id}/undo", responses=problems(404, 409, 422, 503))
-def undo_change(entry_id: str, agent: AgentDep, actor: ActorDep = None) -> AuditEntry:
+def undo_change(entry_id: str, agent: AgentDep, actor: ActorDep) -> AuditEntry:
     """Takes back a rename, merge, split or deletion; answers the entry that says so."""
     return AuditEntry.of(agent.upkeep.undo(entry_id, actor=actor))
 

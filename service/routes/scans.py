@@ -53,9 +53,7 @@ async def add_scan_views(scan_id: str, upload: UploadDep, agent: AgentDep, work:
 
 
 @router.post("/{scan_id}/complete", status_code=201, responses=problems(404, 409, 422, 503))
-async def complete_scan(
-    scan_id: str, agent: AgentDep, work: WorkDep, complete: ScanComplete | None = None, actor: ActorDep = None
-) -> Category:
+async def complete_scan(scan_id: str, agent: AgentDep, work: WorkDep, actor: ActorDep, complete: ScanComplete | None = None) -> Category:
     """Makes the scan's views a category, in one step."""
     name = complete.name if complete else None
     return await work.run(lambda: Category.of(agent.scanning.complete(scan_id, name, actor=actor)))

@@ -8,12 +8,13 @@ from dataclasses import dataclass, field
 
 import anyio
 from anyio.to_thread import run_sync
-from fastapi import APIRouter, WebSocket, WebSocketDisconnect, status
+from fastapi import APIRouter, Depends, WebSocket, WebSocketDisconnect, status
 from pydantic import BaseModel, ValidationError
 from starlette.websockets import WebSocketState
 
 from core.errors import OneLookError, Unavailable
 from service.agent import Agent
+from service.auth import admit_socket
 from service.errors import problem_of, validation_problem
 from service.schemas.tracking import Announcement, Dropped, FrameAnswer, FrameMessage, Hello, Ready, TrackProblem
 from service.settings import Settings
@@ -65,7 +66,7 @@ class Waiting:
         self.arrived.set()
 
 
-@router.websocket("/v1/track")
+@router.websocket("/v1/track", dependencies=[Depends(admit_socket("track"))])
 async def track(socket: WebSocket) -> None:
     """Follows one object through frames; docs/http.md tells the messages."""
     await socket.accept()

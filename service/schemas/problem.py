@@ -47,10 +47,13 @@ def problems(*statuses: int) -> dict[int | str, dict[str, Any]]:
 
 DESCRIPTIONS = {
     400: "The body could not be read",
+    401: "A key is missing, or not valid",
+    403: "The key's role does not allow this",
     404: "There is no such thing",
     409: "Its state does not allow this",
     413: "The body is too large",
     415: "The body is of another media type",
     422: "A field of the request is wrong",
+    429: "The key was used too often",
     503: "Something the service needs is missing or busy",
 }

@@ -50,7 +50,18 @@ def test_a_healthy_machine() -> None:
     assert looked.exit_code == 0, looked.output
     assert "bad" not in looked.output
     written = json.loads(run("--json").stdout)
-    assert [each["what"] for each in written] == ["python", "RAM", "libraries", "Open3D", "device", "weights", "memory", "disk", "port"]
+    assert [each["what"] for each in written] == [
+        "python",
+        "RAM",
+        "libraries",
+        "Open3D",
+        "device",
+        "weights",
+        "memory",
+        "reach",
+        "disk",
+        "port",
+    ]
     assert {each["state"] for each in written} <= {"good", "poor"}
 
 
@@ -144,4 +155,4 @@ def test_a_wrong_setting(monkeypatch: pytest.MonkeyPatch) -> None:
     assert "ONELOOK_MAX_VIEWS" in found.found
     monkeypatch.setenv("ONELOOK_MAX_VIEWS", "32")
     monkeypatch.setenv("ONELOOK_HOST", "0.0.0.0")
-    assert "ONELOOK_TRUST_NETWORK" in findings()["settings"].found
+    assert "onelook keys create" in findings()["reach"].found

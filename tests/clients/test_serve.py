@@ -94,10 +94,14 @@ def test_every_setting_is_in_the_help(serve: Callable[..., Result]) -> None:
         assert f"ONELOOK_{name.upper()}" in shown
 
 
-def test_an_address_that_others_reach_must_be_meant(serve: Callable[..., Result], monkeypatch: pytest.MonkeyPatch) -> None:
-    refused(serve("--host", "0.0.0.0"), "ONELOOK_HOST", "no authentication", "ONELOOK_TRUST_NETWORK")
-    monkeypatch.setenv("ONELOOK_TRUST_NETWORK", "true")
+def test_an_address_that_others_reach_takes_a_key(serve: Callable[..., Result], tmp_path: Path) -> None:
+    refused(serve("--host", "0.0.0.0"), "ONELOOK_HOST", "nobody has a key", "onelook keys create")
+    with Memory.keyring(tmp_path / "memory") as keys:
+        key, _ = keys.create("arm", "robot")
     assert serve("--host", "0.0.0.0").exit_code == 0
+    with Memory.keyring(tmp_path / "memory") as keys:
+        keys.revoke(key.id)
+    refused(serve("--host", "0.0.0.0"), "nobody has a key")
 
 
 def test_wrong_settings_are_told_before_a_backbone_is_loaded(serve: Callable[..., Result], monkeypatch: pytest.MonkeyPatch) -> None:

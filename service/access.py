@@ -1,0 +1,76 @@
+"""Which role each endpoint asks for: this table is the whole of it, and a route that is not in it does not start."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from store.keys import ROLES, Role
+
+VIEWER: Role = "viewer"
+ROBOT: Role = "robot"
+ADMIN: Role = "admin"
+ACCESS: Mapping[str, Role | None] = {
+    # Open to everybody: probes, which tell nothing of the memory.
+    "healthz": None,
+    "readyz": None,
+    # Reading.
+    "info": VIEWER,
+    "metrics": VIEWER,
+    "memory": VIEWER,
+    "events": VIEWER,
+    "list_changes": VIEWER,
+    "list_observations": VIEWER,
+    "get_observation": VIEWER,
+    "observation_rgb": VIEWER,
+    "observation_foreground": VIEWER,
+    "observation_pca": VIEWER,
+    "observation_overlay": VIEWER,
+    "observation_correspondences": VIEWER,
+    "get_scan": VIEWER,
+    "list_categories": VIEWER,
+    "get_category": VIEWER,
+    "list_instances": VIEWER,
+    "category_similarity": VIEWER,
+    "category_rgb": VIEWER,
+    "category_depth": VIEWER,
+    "category_mask": VIEWER,
+    "category_saliency": VIEWER,
+    "category_foreground": VIEWER,
+    "category_pca": VIEWER,
+    "category_overlay": VIEWER,
+    "category_cloud": VIEWER,
+    "list_goals": VIEWER,
+    "get_goal": VIEWER,
+    # What a robot does: looking, scanning, following, and taking things where they belong.
+    "observe": ROBOT,
+    "track": ROBOT,
+    "begin_scan": ROBOT,
+    "exclude_viewpoints": ROBOT,
+    "add_scan_views": ROBOT,
+    "complete_scan": ROBOT,
+    "delete_scan": ROBOT,
+    "create_goal": ROBOT,
+    "plan": ROBOT,
+    # Changing what was learnt, and the memory as a whole.
+    "name_category": ADMIN,
+    "delete_category": ADMIN,
+    "merge_category": ADMIN,
+    "split_category": ADMIN,
+    "delete_instance": ADMIN,
+    "delete_goal": ADMIN,
+    "undo_change": ADMIN,
+    "calibrate_memory": ADMIN,
+    "backup_memory": ADMIN,
+    "export_memory": ADMIN,
+    "import_memory": ADMIN,
+    # The console's pages.
+    "console_now": VIEWER,
+    "console_observations": VIEWER,
+    "console_observation": VIEWER,
+}
+"""By the route's name, which is its operation id, after `console_` for a page; None asks nobody for a key."""
+
+
+def allows(role: Role, needed: Role) -> bool:
+    """Whether `role` may do what takes `needed`."""
+    return ROLES.index(role) >= ROLES.index(needed)

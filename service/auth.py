@@ -1,0 +1,161 @@
+"""Who asks, and whether they may: a request is let in before anything else of it is read, answered from a cache, or done.
+
+Who has no key can only be let in while there never was one, which takes a service that no other machine reaches.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Coroutine
+from dataclasses import dataclass
+from ipaddress import ip_address
+from typing import Any
+
+from anyio.to_thread import run_sync
+from fastapi import Request, Response, WebSocket
+from fastapi.routing import APIRoute
+from starlette.requests import HTTPConnection
+
+from core.errors import OneLookError
+from service.access import ACCESS, ADMIN, allows
+from service.rate import RateLimit
+from store.keys import Key, Keys, Role
+from store.sessions import Sessions
+
+Answer = Callable[[Request], Coroutine[Any, Any, Response]]
+COOKIE = "onelook_session"
+HOW = "send the header `Authorization: Bearer KEY` (ONELOOK_API_KEY for the client and the commands)"
+
+
+class NoKey(OneLookError):
+    """Nobody knows who asks."""
+
+
+class NotAllowed(OneLookError):
+    """It is known who asks, and they may not."""
+
+
+class TooOften(OneLookError):
+    """The key's requests of this minute are used up."""
+
+    def __init__(self, message: str, retry_after_s: int) -> None:
+        super().__init__(message)
+        self.retry_after_s = retry_after_s
+
+
+@dataclass(frozen=True)
+class Caller:
+    """Who asks."""
+
+    name: str | None
+    """Of their key; None where there are no keys."""
+    role: Role
+
+    def may(self, needed: Role) -> bool:
+        """Whether they may do what takes this role."""
+        return allows(self.role, needed)
+
+    def as_actor(self, said: str | None) -> str | None:
+        """For the audit trail: the key's name, which is sure, before what they say of themselves, which is not."""
+        return f"{self.name} ({said})" if self.name and said else self.name or said
+
+
+ANYBODY = Caller(None, ADMIN)
+
+
+class Guard:
+    """Of one application."""
+
+    def __init__(self, keys: Keys, sessions: Sessions, per_minute: int, *, asks: bool = True) -> None:
+        """`asks` is False for a service that only its own process reaches."""
+        self._keys = keys
+        self._sessions = sessions
+        self._rate = RateLimit(per_minute)
+        self._per_minute = per_minute
+        self._asks = asks
+
+    async def admit(self, connection: HTTPConnection, needed: Role | None) -> None:
+        """Puts the caller in the connection's state. Raises NoKey, NotAllowed, TooOften."""
+        if needed is None:
+            return
+        key = await run_sync(self._key, connection) if self._asks else None
+        if key is not None:
+            self._require_rate(key)
+        caller = Caller(key.name, key.role) if key else ANYBODY
+        if not caller.may(needed):
+            raise NotAllowed(f"the key {caller.name!r} has the role {caller.role}, this takes {needed}; ask for another key")
+        connection.state.caller = caller
+
+    def _key(self, connection: HTTPConnection) -> Key | None:
+        """None where there never was a key."""
+        sent = connection.headers.get("authorization")
+        session = connection.cookies.get(COOKIE)
+        if sent is not None:
+            key = self._keys.find(_bearer(sent))
+            if key is not None:
+                return key
+        elif session is not None and (key := self._sessions.find(session)) is not None:
+            return key
+        if self._keys.required():
+            raise NoKey(f"this service asks for a key; {HOW}" if sent is None else "the key is none of this service, or was revoked")
+        _require_own_name(connection)
+        return None
+
+    def _require_rate(self, key: Key) -> None:
+        wait_s = math.ceil(self._rate.take(key.id))
+        if wait_s:
+            limit = f"{self._per_minute} requests a minute (ONELOOK_RATE_LIMIT)"
+            raise TooOften(f"the key {key.name!r} has used up its {limit}; ask again in {wait_s} s", wait_s)
+
+
+class GuardedRoute(APIRoute):
+    """A route whose caller must have the role that `service.access` says."""
+
+    kind = ""
+    """Before the route's name in that table."""
+
+    def get_route_handler(self) -> Answer:
+        """FastAPI's, with `around` about it, and the guard before both."""
+        answer = self.around(super().get_route_handler())
+        needed = ACCESS[self.kind + self.name]
+
+        async def guarded(request: Request) -> Response:
+            await request.app.state.guard.admit(request, needed)
+            return await answer(request)
+
+        return guarded
+
+    def around(self, answer: Answer) -> Answer:
+        """What else a kind of routes does; here nothing."""
+        return answer
+
+
+def admit_socket(name: str) -> Callable[[WebSocket], Coroutine[Any, Any, None]]:
+    """A dependency that does the same for the WebSocket route of this name, before the connection is accepted."""
+    needed = ACCESS[name]
+
+    async def admit(socket: WebSocket) -> None:
+        await socket.app.state.guard.admit(socket, needed)
+
+    return admit
+
+
+def _bearer(header: str) -> str:
+    scheme, _, key = header.partition(" ")
+    if scheme.lower() != "bearer":
+        raise NoKey(f"Authorization says {scheme!r}; {HOW}")
+    return key.strip()
+
+
+def _require_own_name(connection: HTTPConnection) -> None:
+    """Raises NotAllowed for a name that somebody else's page may have given this address, to be let in as if it were the service's own.
+
+    Such a page (DNS rebinding) needs a public name, which has a dot in it.
+    """
+    name = connection.url.hostname or ""
+    if "." not in name or name.endswith((".localhost", ".local")):
+        return
+    try:
+        ip_address(name)
+    except ValueError:
+        raise NotAllowed(f"asked for as {name!r} this service wants a key, since any web page can send you here; {HOW}") from None
