@@ -123,7 +123,7 @@ class AuditEntry(BaseModel):
 
     id: str
     created_at: str = Field(description="ISO 8601, UTC.", examples=["2026-01-31T12:00:00.000+00:00"])
-    actor: str | None = Field(description="Who asked for it, as X-Actor said.")
+    actor: str | None = Field(description="Who asked for it: the name of their key where there are keys, and what X-Actor said.")
     action: records.Action
     category_id: str | None = Field(description="The category that was changed.")
     before: dict[str, Any] = Field(description="How it was, as far as it changed.")

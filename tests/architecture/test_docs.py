@@ -22,7 +22,7 @@ PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 TEXT = "\n".join(page.read_text() for page in PAGES)
 HTTP = (ROOT / "docs" / "http.md").read_text()
 OPERATIONS = (ROOT / "docs" / "operations.md").read_text()
-OTHER_SETTINGS = {"ONELOOK_CACHE", "ONELOOK_URL"}
+OTHER_SETTINGS = {"ONELOOK_API_KEY", "ONELOOK_CACHE", "ONELOOK_URL"}
 """Read outside the service."""
 
 
