@@ -67,6 +67,9 @@ ACCESS: Mapping[str, Role | None] = {
     "console_now": VIEWER,
     "console_observations": VIEWER,
     "console_observation": VIEWER,
+    "console_sign_in": None,
+    "console_begin_session": None,
+    "console_end_session": None,
 }
 """By the route's name, which is its operation id, after `console_` for a page; None asks nobody for a key."""
 

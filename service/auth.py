@@ -82,9 +82,9 @@ class Guard:
         if key is not None:
             self._require_rate(key)
         caller = Caller(key.name, key.role) if key else ANYBODY
+        connection.state.caller = caller
         if not caller.may(needed):
             raise NotAllowed(f"the key {caller.name!r} has the role {caller.role}, this takes {needed}; ask for another key")
-        connection.state.caller = caller
 
     def _key(self, connection: HTTPConnection) -> Key | None:
         """None where there never was a key."""

@@ -10,11 +10,11 @@ from urllib.parse import urlencode
 from anyio.to_thread import run_sync
 from fastapi import Request, Response
 from fastapi.exceptions import RequestValidationError
-from fastapi.responses import HTMLResponse
+from fastapi.responses import HTMLResponse, RedirectResponse
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from core.errors import OneLookError
-from service.auth import Answer, GuardedRoute
+from service.auth import Answer, Caller, GuardedRoute, NoKey
 from service.console.assets import asset_url
 from service.console.words import FILTERS
 from service.errors import problem_of, validation_problem
@@ -63,7 +63,8 @@ def render(request: Request, template: str, status: int = 200, **context: Any) -
     """A page, or the part of one that htmx asked for."""
     path = request.url.path
     here = next((link.path for link in NAVIGATION if link.path != "/" and path.startswith(link.path)), "/" if path == "/" else None)
-    return HTMLResponse(ENVIRONMENT.get_template(template).render(request=request, here=here, **context), status)
+    caller: Caller | None = getattr(request.state, "caller", None)
+    return HTMLResponse(ENVIRONMENT.get_template(template).render(request=request, here=here, caller=caller, **context), status)
 
 
 class Page(GuardedRoute):
@@ -78,6 +79,8 @@ class Page(GuardedRoute):
         async def page(request: Request) -> Response:
             try:
                 response = await answer(request)
+            except NoKey:
+                response = _to_sign_in(request)
             except OneLookError as error:
                 response = await run_sync(_problem, request, problem_of(error))
             except RequestValidationError as error:
@@ -87,6 +90,14 @@ class Page(GuardedRoute):
             return response
 
         return page
+
+
+def _to_sign_in(request: Request) -> Response:
+    """And from there back; to the first page from what is no page, or a part of one."""
+    part = "hx-request" in request.headers
+    path = request.url.path if request.method == "GET" and not part else "/"
+    address = "/sign-in" + query(next=f"{path}?{request.url.query}" if request.url.query and path != "/" else path)
+    return Response(status_code=401, headers={"HX-Redirect": address}) if part else RedirectResponse(address, 303)
 
 
 def _problem(request: Request, problem: Problem) -> Response:
