@@ -10,8 +10,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from clients.answers import Category
-from clients.robot import Scan
 from clients.simulator.world import World
 from core.scan import look_at
 from core.sim3 import rotation_angle_deg
@@ -50,10 +48,13 @@ class ArmConfig:
 
 AZIMUTHS_DEG = (0, 12, -12, 24, -24, 36, -36, 48, -48)
 ELEVATIONS_DEG = (0, 10, 20, 30, 40)
-CLOSER = (1.0, 0.85, 0.7, 0.55)
-"""Where else to look from when a viewpoint is out of reach: around the object, higher, closer."""
+CLOSER = 0.85
+"""Where else to look from when a viewpoint is out of reach: around the object, higher, closer step by step."""
 NEAREST_M = 0.4
 """Closer than this an object is cut off by the image's edge."""
+BESIDE_DEG = ((0, 15), (15, 0), (-15, 0), (0, -15))
+BACK = (1.2, 1.0)
+"""Where to look from once more after a view that turned out badly: higher, beside, lower, and better from a little farther off."""
 MOST_OFF_DEG = 50.0
 """A view from farther off than this is none of what was asked for."""
 APART_DEG = 6.0
@@ -99,8 +100,13 @@ class Arm:
         if self.cannot_reach(world_from_camera) is None:
             return world_from_camera
         others = [pose for pose in _others(world_from_camera, center_m) if self.cannot_reach(pose) is None]
-        off = [_angle_deg(world_from_camera, pose, center_m) for pose in others]
+        off = [round(_angle_deg(world_from_camera, pose, center_m), 2) for pose in others]  # of one direction the farthest is first
         return others[int(np.argmin(off))] if off and min(off) <= MOST_OFF_DEG else None
+
+    def beside(self, world_from_camera: FloatArray, center_m: FloatArray) -> FloatArray | None:
+        """A pose that can be reached, a little beside one and farther off, to look once more; None where there is none."""
+        others = (_turned(world_from_camera, center_m, turn, rise, back) for back in BACK for turn, rise in BESIDE_DEG)
+        return next((pose for pose in others if self.cannot_reach(pose) is None), None)
 
     def look(self, world_from_camera: FloatArray) -> View:
         """Goes to a pose that can be reached, and takes a picture."""
@@ -129,12 +135,6 @@ class Arm:
         """Views of whatever is there, from where a robot looks before it is asked for anything."""
         return Burst(list(self.look_around(self.world.viewpoints(count, seed), self.world.center_m)))
 
-    def carry_out(self, scan: Scan, name: str | None = None) -> Category:
-        """Brings a scan the views it asks for, and completes it. Raises ServiceProblem."""
-        for view in self.look_around(list(scan), scan.request.center_m):
-            scan.add(view)
-        return scan.complete(name)
-
     def carry(self, distance_m: float, angle_deg: float) -> None:
         """Takes the time of a pick, a way and a place."""
         way = max(distance_m / self.config.speed_m_s, angle_deg / self.config.turn_deg_s)
@@ -154,16 +154,22 @@ FREE = replace(ArmConfig(), limits=None)
 
 def _others(world_from_camera: FloatArray, center_m: FloatArray) -> Iterator[FloatArray]:
     """Poses about the object that look at the same point from other sides."""
-    offset = world_from_camera[:3, 3] - center_m
-    radius = float(np.linalg.norm(offset))
-    azimuth, elevation = np.arctan2(offset[1], offset[0]), np.arcsin(np.clip(offset[2] / radius, -1, 1))
+    radius = float(np.linalg.norm(world_from_camera[:3, 3] - center_m))
+    steps = 1 + max(0, int(np.log(NEAREST_M / radius) / np.log(CLOSER)))
     for turn in AZIMUTHS_DEG:
         for rise in ELEVATIONS_DEG:
-            height = min(elevation + np.radians(rise), np.radians(80))
-            for closer in (each for each in CLOSER if each == 1.0 or each * radius >= NEAREST_M):
-                level = np.cos(height)
-                towards = np.array([level * np.cos(azimuth + np.radians(turn)), level * np.sin(azimuth + np.radians(turn)), np.sin(height)])
-                yield look_at(center_m + closer * radius * towards, center_m, UP)
+            for step in range(steps):
+                yield _turned(world_from_camera, center_m, turn, rise, CLOSER**step)
+
+
+def _turned(world_from_camera: FloatArray, center_m: FloatArray, turn_deg: float, rise_deg: float, farther: float) -> FloatArray:
+    """The pose carried around the object, up, and to `farther` times its distance; aimed at the object."""
+    offset = world_from_camera[:3, 3] - center_m
+    radius = float(np.linalg.norm(offset))
+    azimuth = np.arctan2(offset[1], offset[0]) + np.radians(turn_deg)
+    elevation = min(np.arcsin(np.clip(offset[2] / radius, -1, 1)) + np.radians(rise_deg), np.radians(80))
+    towards = np.array([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])
+    return look_at(center_m + farther * radius * towards, center_m, UP)
 
 
 def _angle_deg(first: FloatArray, second: FloatArray, center_m: FloatArray) -> float:

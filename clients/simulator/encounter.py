@@ -94,6 +94,8 @@ class Encounter:
     """How far off the views brought were from those asked for."""
     refused: int
     """Viewpoints that the arm could not reach, nor any near them."""
+    view_faults: tuple[str, ...]
+    """What the service found wrong with views of the scan: each of those was taken once more from beside."""
     failure: str | None
     """Why there is no pose or no category where there should be one."""
     observe_ms: float
@@ -120,6 +122,7 @@ class Encounter:
                 "verdict": Verdict(fields["verdict"]),
                 "error": PoseError(**error) if error else None,
                 "offsets_deg": tuple(fields["offsets_deg"]),
+                "view_faults": tuple(fields["view_faults"]),
             }
         )
 

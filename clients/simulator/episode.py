@@ -12,11 +12,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 from clients.answers import Category
-from clients.errors import ClientError, ServiceProblem
+from clients.errors import ClientError
 from clients.pose_error import PoseError, pose_error
 from clients.robot import Observation, RobotClient
 from clients.simulator.arm import FREE, Arm, ArmConfig
 from clients.simulator.encounter import Encounter, Founder, Verdict, best_view, judge
+from clients.simulator.scanning import COULD_NOT, ScanReport, carry_out
 from clients.simulator.world import Subject, WorldObject
 from core.views import Burst
 
@@ -104,9 +105,10 @@ class Episode:
         founder = self._truth.founder(seen.category_id)
         verdict = judge(seen.outcome, thing.category, founder, in_memory)
         learnt, scan_ms, failure = None, None, seen.pose_error or seen.scan_error
+        report = ScanReport()
         if seen.scan is not None:
             started = time.perf_counter()
-            learnt, failure = _carry_out(seen, arm)
+            learnt, failure = _carry_out(seen, arm, report)
             scan_ms = (time.perf_counter() - started) * 1e3
         if learnt is not None:
             self._truth.add(learnt.id, Founder.of(thing))
@@ -134,7 +136,8 @@ class Episode:
             views=len(burst),
             looks=looks,
             offsets_deg=tuple(arm.offsets_deg),
-            refused=arm.refused,
+            refused=arm.refused + len(report.out_of_reach),
+            view_faults=tuple(report.faults),
             failure=failure,
             observe_ms=observe_ms,
             scan_ms=scan_ms,
@@ -176,12 +179,12 @@ def shuffled(subjects: Sequence[Subject], seed: int) -> list[Subject]:
     return order
 
 
-def _carry_out(seen: Observation, arm: Arm) -> tuple[Category | None, str | None]:
+def _carry_out(seen: Observation, arm: Arm, report: ScanReport) -> tuple[Category | None, str | None]:
     """The category made, or why none was."""
     assert seen.scan is not None
     try:
-        return arm.carry_out(seen.scan), None
-    except ServiceProblem as problem:
+        return carry_out(arm, seen.scan, report=report), None
+    except COULD_NOT as problem:
         return None, str(problem)
 
 

@@ -24,6 +24,7 @@ from clients.simulator.raycast.mesh import rotation_about
 from clients.simulator.raycast.model import Model
 from clients.simulator.raycast.sensor import SensorConfig
 from clients.simulator.raycast.world import CENTER_M, RaycastWorld, standing
+from clients.simulator.scanning import COULD_NOT, learn_from_scan
 from core.scan import look_at
 from core.sim3 import Sim3, rotation_angle_deg
 from core.views import FloatArray
@@ -107,7 +108,7 @@ class Rearrangement:
         try:
             if category not in self._goals:
                 self._show_goal(category)
-        except ServiceProblem as problem:
+        except COULD_NOT as problem:
             return Trial(number, "", category, "", False, None, None, None, None, f"no goal: {problem}", 0.0, time.perf_counter() - started)
         goal_id, category_id, goal, reference = self._goals[category]
         model = RECIPES[category].make(category, self._seed * 1000 + number)
@@ -152,13 +153,13 @@ class Rearrangement:
         )
 
     def _show_goal(self, category: str) -> None:
-        """Learns the category from its reference, then shows the reference at the goal. Raises ServiceProblem."""
+        """Learns the category from its reference, then shows the reference at the goal. Raises ServiceProblem, ScanFailed."""
         reference = RECIPES[category].make(category, self._seed * 1000)
         visit = 100_000 + self._categories.index(category)
         world = self._world(visit)
         world.show([reference])
         arm = Arm(world, ArmConfig())
-        category_id = arm.carry_out(self._robot.scan(arm.glance(self._views, visit))).id
+        category_id = learn_from_scan(self._robot, arm, self._views, visit).id
         place = np.random.default_rng([self._seed, visit])
         goal = standing(reference, rotation_about("z", float(place.uniform(0, 360))), GOAL_M)
         world = self._world(visit)

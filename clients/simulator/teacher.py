@@ -14,10 +14,10 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Literal
 
-from clients.errors import ServiceProblem
 from clients.robot import RobotClient
 from clients.simulator.arm import Arm
 from clients.simulator.episode import Conduct
+from clients.simulator.scanning import COULD_NOT, learn_from_scan
 from clients.simulator.world import Subject
 
 Action = Literal["teach", "ask"]
@@ -149,9 +149,8 @@ class Lessons:
         subject, arm = self._next(category)
         failure = None
         try:
-            scan = self._robot.scan(arm.glance(self._conduct.views, len(self._lessons)))
-            self._ids[category] = arm.carry_out(scan).id
-        except ServiceProblem as problem:
+            self._ids[category] = learn_from_scan(self._robot, arm, self._conduct.views, len(self._lessons)).id
+        except COULD_NOT as problem:
             failure = str(problem)
         return self._keep("teach", subject, None, failure is None, False, None, None, failure, started)
 

@@ -33,6 +33,7 @@ BASE = Encounter(
     looks=1,
     offsets_deg=(),
     refused=0,
+    view_faults=(),
     failure=None,
     observe_ms=100.0,
     scan_ms=None,
