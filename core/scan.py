@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from core.boxes import cloud_extent_m
+from core.boxes import cloud_extent_m, remove_outliers
 from core.encode import EncodedBurst
 from core.errors import InvalidInput, NoObject
 from core.views import Camera
@@ -77,8 +77,9 @@ def request_scan(encoded: EncodedBurst, options: ScanOptions | None = None) -> S
         raise InvalidInput("views", "none has K and world_from_camera, so viewpoints cannot be placed")
     if not len(encoded.cloud_m):
         raise NoObject("views", "no depth was measured on the object, so viewpoints cannot be placed around it")
-    center = np.median(encoded.cloud_m, axis=0).astype(float)
-    extent = cloud_extent_m(encoded.cloud_m)
+    cloud = remove_outliers(encoded.cloud_m)  # a few patches of what is behind would have the viewpoints metres away
+    center = np.median(cloud, axis=0).astype(float)
+    extent = cloud_extent_m(cloud)
     up, source = infer_up(cameras) if options.up is None else (unit_up(options.up), "given")
     radius = standoff_m(extent, cameras) if options.standoff_m is None else options.standoff_m
     return ScanRequest(center, up, radius, hemisphere(center, up, radius, options.viewpoints), extent, source)

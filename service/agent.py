@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from core.agreement import agreeing
 from core.backbones.base import Backbone
 from core.boxes import OrientedBox
 from core.clock import StageClock
@@ -102,7 +103,7 @@ class Agent:
         if options.category_id is not None:
             self.memory.categories.get(options.category_id)
         clock = StageClock()
-        encoded = self.encoder.encode(burst)
+        encoded = agreeing(self.encoder.encode(burst))
         clock.lap("encode")
         judge = Judge(self.memory, encoded, self.backbone.whitening, options.seed)
         judged = None if options.category_id is not None else self._judge(judge, options)

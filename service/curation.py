@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from core.agreement import agreeing
 from core.descriptors import unit
 from core.encode import Encoder
 from core.errors import Conflict, InvalidInput, Unavailable
@@ -75,7 +76,7 @@ class Curation:
         if len(chosen) == len(own):
             raise InvalidInput("instance_ids", "are all instances of the category; leave it at least one, or rename it")
         burst = self._reference_burst(chosen)
-        reference = build_reference(self._encoder.encode(burst))
+        reference = build_reference(agreeing(self._encoder.encode(burst)))
         category = self._memory.categories.split(category_id, chosen, reference, burst, name=name, actor=actor)
         self._events.publish("category_split", id=category.id, name=name, split_from=category_id)
         return category

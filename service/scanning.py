@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
+from core.agreement import agreeing
 from core.encode import Encoder
 from core.errors import InvalidInput, TooFewViews
 from core.packing import burst_from_arrays
@@ -46,7 +47,7 @@ class Scanning:
         if isinstance(source, str):
             encoded, observation_id = burst_from_arrays(self._memory.observations.features(source)), source
         else:
-            encoded, observation_id = self._encoder.encode(source), None
+            encoded, observation_id = agreeing(self._encoder.encode(source)), None
         request = request_scan(encoded, options or ScanOptions(self._viewpoints))
         scan = self._memory.scans.create(request, observation_id)
         self._events.publish("scan_begun", id=scan.id, observation_id=observation_id)
@@ -85,7 +86,7 @@ class Scanning:
         if burst is None or len(burst) < MIN_VIEWS:
             found = f"the scan has {scan.views} of at least {MIN_VIEWS} views"
             raise TooFewViews("views", f"{found}; send {MIN_VIEWS - scan.views} more to /v1/scans/{scan_id}/views, from other sides")
-        encoded = self._encoder.encode(burst)
+        encoded = agreeing(self._encoder.encode(burst))
         category = self._memory.categories.create(build_reference(encoded), burst, encoded, name=name, scan_id=scan_id, actor=actor)
         self._events.publish("category_created", id=category.id, name=name, scan_id=scan_id)
         return category

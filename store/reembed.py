@@ -12,6 +12,7 @@ from pathlib import Path
 
 from sqlite_utils import Database
 
+from core.agreement import agreeing
 from core.backbones.base import Backbone
 from core.encode import EncodedBurst, Encoder
 from core.errors import InvalidInput, OneLookError, Unavailable
@@ -88,7 +89,7 @@ def _compute(connection: Connection, encoder: Encoder, features: Features, gener
         folder = connection.root / row["folder"]
         files = files_from_json(row["files"])
         try:
-            encoded = encoder.encode(read_burst(folder))
+            encoded = agreeing(encoder.encode(read_burst(folder)))
             if table == "categories":
                 reference = build_reference(encoded)
                 written = _beside(folder, files, f"reference-{generation}.npz", reference.as_arrays())

@@ -101,7 +101,7 @@ def test_learn_one_know_it_elsewhere_tell_another_apart(http, parts, recorded, c
 
 
 def test_a_frame_is_tracked(http, category, scanned):
-    view = scanned.views[1]
+    view = scanned.views[0]
     images = {"rgb": view.rgb[..., ::-1], "depth": np.round(view.depth_m * 1000).astype(np.uint16)}
     frame = {name: base64.b64encode(cv2.imencode(".png", image)[1].tobytes()).decode() for name, image in images.items()}
     frame |= {"K": view.camera.K.tolist(), "world_from_camera": view.camera.world_from_camera.tolist()}

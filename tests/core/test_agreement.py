@@ -1,0 +1,74 @@
+"""What a view shows far from where the others have the object goes; views of all sides of one object stay."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from core.agreement import agreeing
+from core.encode import EncodedBurst, EncodedView
+from core.reference import build_reference
+from core.scan import request_scan
+from core.sim3 import Sim3
+
+from .conftest import PaintedObject
+
+
+def of_a_table(view: EncodedView) -> EncodedView:
+    """The same view, with patches spread over 3 m."""
+    points = np.random.default_rng(1).uniform(-1.5, 1.5, view.points_m.shape) * (1, 1, 0.01)
+    return replace(view, points_m=points.astype(np.float32))
+
+
+def with_table(encoded: EncodedBurst, index: int) -> EncodedBurst:
+    views = list(encoded.views)
+    views[index] = of_a_table(views[index])
+    return replace(encoded, views=tuple(views))
+
+
+def test_a_view_of_the_table_is_emptied_and_no_other(painted: PaintedObject) -> None:
+    encoded = with_table(painted.encode(8, Sim3.identity()), 2)
+    kept = agreeing(encoded)
+    assert [len(view.cells) > 0 for view in kept.views] == [index != 2 for index in range(8)]
+    assert len(kept.pooled) == len(kept.cls) == 7
+    np.testing.assert_allclose(
+        build_reference(kept).box.extent_m, build_reference(painted.encode(8, Sim3.identity())).box.extent_m, rtol=0.05
+    )
+
+
+def test_of_a_view_that_shows_a_wall_too_the_object_stays(painted: PaintedObject) -> None:
+    encoded = painted.encode(8, Sim3.identity())
+    view = encoded.views[3]
+    walled = view.points_m.copy()
+    walled[: len(walled) // 4] += (0.0, 3.0, 0.0)
+    views = (*encoded.views[:3], replace(view, points_m=walled), *encoded.views[4:])
+    kept = agreeing(replace(encoded, views=views)).views[3]
+    np.testing.assert_array_equal(kept.points_m, view.points_m[len(walled) // 4 :])
+    np.testing.assert_array_equal(kept.descriptors, view.descriptors[len(walled) // 4 :])
+
+
+def test_all_sides_of_an_object_stay(painted: PaintedObject, moved: Sim3) -> None:
+    encoded = painted.encode(12, moved)
+    assert all(kept is view for kept, view in zip(agreeing(encoded).views, encoded.views))
+
+
+def test_of_two_views_that_differ_both_stay(painted: PaintedObject) -> None:
+    encoded = with_table(painted.encode(2, Sim3.identity()), 0)
+    assert agreeing(encoded) is encoded
+
+
+def test_views_without_depth_say_nothing(painted: PaintedObject) -> None:
+    encoded = painted.encode(6, Sim3.identity())
+    blind = replace(encoded, views=tuple(replace(view, points_m=np.full_like(view.points_m, np.nan)) for view in encoded.views))
+    assert agreeing(blind) is blind
+
+
+def test_a_scan_is_asked_for_about_the_object_though_some_patches_are_of_the_wall(painted: PaintedObject) -> None:
+    encoded = painted.encode(8, Sim3.identity())
+    first = encoded.views[0]
+    strays = first.points_m.copy()
+    strays[: len(strays) // 3] += (0.0, 0.0, 4.0)
+    strayed = replace(encoded, views=(replace(first, points_m=strays), *encoded.views[1:]))
+    assert request_scan(strayed).radius_m == pytest.approx(request_scan(encoded).radius_m, rel=0.1)
