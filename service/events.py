@@ -68,6 +68,12 @@ class Events:
         self._next = 1
         self._closed = False
 
+    @property
+    def last_id(self) -> int:
+        """Of the latest event, 0 before the first."""
+        with self._lock:
+            return self._next - 1
+
     def publish(self, kind: Kind, **about: Any) -> None:
         """Tells every listener; never waits for one."""
         with self._lock:

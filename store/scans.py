@@ -47,6 +47,11 @@ class Scans:
             raise NotFound(f"no scan has the id {scan_id!r}; POST /v1/scans begins one")
         return _scan(row)
 
+    def in_progress(self, limit: int) -> list[Scan]:
+        """Those that views may still come for, the latest begun first."""
+        rows = self._connection.rows(f"{SELECT} WHERE s.{OPEN} AND s.expires_at > ? ORDER BY s.rowid DESC LIMIT ?", now(), limit)
+        return [_scan(row) for row in rows]
+
     def require_open(self, scan_id: str) -> Scan:
         """Raises NotFound, and Conflict where it is completed or expired."""
         scan = self.get(scan_id)

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-NO_NAME = "unnamed"
 SHORT = 8
 """Characters of an id that people compare."""
+FEW = 4
+"""Enough to tell the categories of a page apart."""
 
 
 def milliseconds(value: float) -> str:
@@ -35,14 +36,16 @@ def clock(iso: str) -> str:
     return f"{iso[:10]} {iso[11:19]} UTC"
 
 
-def called(name: str | None) -> str:
-    """A category's name; it may have none."""
-    return name or NO_NAME
+def called(name: str | None, identifier: str | None) -> str:
+    """A category's name, else the beginning of its id; it may be gone."""
+    if identifier is None:
+        return "a category that is gone"
+    return name or f"unnamed {identifier[:FEW]}"
 
 
 def decimal(value: float | None, digits: int = 2) -> str:
     """With so many digits; a dash where there is none."""
-    return "–" if value is None else f"{value:.{digits}f}"
+    return "–" if value is None else f"{round(value, digits) + 0.0:.{digits}f}"  # never -0.00
 
 
 FILTERS: dict[str, Callable[..., Any]] = {

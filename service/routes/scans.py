@@ -13,7 +13,7 @@ from service.exchange import MemoryRoute
 from service.schemas.bursts import BURST_BODY, burst_or
 from service.schemas.categories import Category
 from service.schemas.problem import problems
-from service.schemas.scans import Scan, ScanBegin, ScanComplete, ScanExclude, ScanQuery
+from service.schemas.scans import Scan, ScanBegin, ScanComplete, ScanExclude, ScanList, ScanQuery
 from store import records
 
 router = APIRouter(prefix="/v1/scans", tags=["scans"], route_class=MemoryRoute)
@@ -26,6 +26,12 @@ async def begin_scan(
     """Viewpoints to look from at the object of a burst, or of an earlier observation: a scan whatever was decided then."""
     options = query.options(agent.config.scan_views)
     return await work.run(lambda: scan_answer(agent, agent.scanning.begin(source.burst_or_id, options)))
+
+
+@router.get("", responses=problems(422))
+def list_scans(agent: AgentDep, limit: Annotated[int, Query(ge=1, le=1000, description="Most to list.")] = 50) -> ScanList:
+    """Those in progress, the latest begun first."""
+    return ScanList(scans=[scan_answer(agent, found) for found in agent.memory.scans.in_progress(limit)])
 
 
 @router.get("/{scan_id}", responses=problems(404, 422))

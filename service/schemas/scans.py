@@ -87,6 +87,12 @@ class Scan(BaseModel):
         )
 
 
+class ScanList(BaseModel):
+    """Scans in progress, the latest begun first."""
+
+    scans: list[Scan]
+
+
 class ScanBegin(BaseModel):
     """A scan of an object that was observed before."""
 

@@ -122,7 +122,7 @@ def test_every_endpoint_answers(http, called, parts, scanned, category, seen):
     for name in ("rgb", "foreground", "pca", "overlay", "correspondences"):
         assert picture.match(http.get(f"/v1/observations/{seen['id']}/{name}.png").headers["content-type"])
     assert http.get(f"/v1/observations/{seen['id']}").json() == seen
-    for read in ("/v1/observations", "/v1/categories", path, f"{path}/cloud.ply", f"{path}/similarity", "/v1/memory", "/v1/info"):
+    for read in ("/v1/observations", "/v1/categories", path, f"{path}/cloud.ply", f"{path}/similarity", "/v1/memory", "/v1/info", "/v1/scans"):
         http.get(read)
     for probe in ("/healthz", "/readyz", "/metrics"):
         http.get(probe)

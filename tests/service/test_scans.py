@@ -181,3 +181,11 @@ def test_exclusions_and_coverage_survive_a_restart(settings, backbone, look, par
         before = client.get(f"/v1/scans/{scan['id']}").json()
     with TestClient(create_app(settings, backbone=backbone)) as client:
         assert client.get(f"/v1/scans/{scan['id']}").json() == before
+
+
+def test_scans_in_progress_are_listed(client, scan, look, parts):
+    other = client.post("/v1/scans", files=parts(look())).json()
+    add(client, other, parts, look())
+    assert [each["id"] for each in client.get("/v1/scans").json()["scans"]] == [other["id"], scan["id"]]
+    client.post(f"/v1/scans/{other['id']}/complete")
+    assert [each["id"] for each in client.get("/v1/scans").json()["scans"]] == [scan["id"]]

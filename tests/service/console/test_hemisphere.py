@@ -1,0 +1,45 @@
+"""A scan's viewpoints as a picture."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from core.scan import ScanRequest, coverage, hemisphere
+from service.console.hemisphere import CENTRE, HEIGHT, RADIUS, WIDTH, hemisphere_of
+
+
+@pytest.fixture
+def request_of():
+    """request_of(up): ten viewpoints about the origin."""
+
+    def made(up):
+        up = np.asarray(up, dtype=float) / np.linalg.norm(up)
+        return ScanRequest(np.zeros(3), up, 0.5, hemisphere(np.zeros(3), up, 0.5, 10), 0.2)
+
+    return made
+
+
+@pytest.mark.parametrize("up", [(0, 0, 1), (0, -1, 0), (1, 2, 3)])
+def test_every_viewpoint_is_within_the_picture(request_of, up):
+    drawn = hemisphere_of(request_of(up), coverage(request_of(up), []))
+    assert [mark.covered for mark in drawn.marks] == [False] * 10
+    for mark in drawn.marks:
+        assert 0 < mark.x < WIDTH
+        assert 0 < mark.y < HEIGHT
+
+
+def test_it_fills_as_views_arrive(request_of):
+    request = request_of((0, 0, 1))
+    counts = [hemisphere_of(request, coverage(request, list(request.world_from_camera[:seen]))).covered for seen in (0, 1, 10)]
+    assert counts == [0, 1, 10]
+
+
+def test_straight_up_is_the_top_of_the_dome(request_of):
+    request = request_of((0, 0, 1))
+    above = np.eye(4)
+    above[2, 3] = 0.5
+    top = ScanRequest(np.zeros(3), request.up, 0.5, above[None], 0.2)
+    (mark,) = hemisphere_of(top, coverage(top, [])).marks
+    assert mark.x == pytest.approx(CENTRE[0], abs=0.1)
+    assert CENTRE[1] - RADIUS < mark.y < CENTRE[1] - 0.8 * RADIUS
