@@ -26,6 +26,7 @@ ACCESS: Mapping[str, Role | None] = {
     "observation_pca": VIEWER,
     "observation_overlay": VIEWER,
     "observation_correspondences": VIEWER,
+    "list_scans": VIEWER,
     "get_scan": VIEWER,
     "list_categories": VIEWER,
     "get_category": VIEWER,
@@ -52,6 +53,7 @@ ACCESS: Mapping[str, Role | None] = {
     "create_goal": ROBOT,
     "plan": ROBOT,
     # Changing what was learnt, and the memory as a whole.
+    "correct_observation": ADMIN,
     "name_category": ADMIN,
     "delete_category": ADMIN,
     "merge_category": ADMIN,
@@ -65,7 +67,9 @@ ACCESS: Mapping[str, Role | None] = {
     "import_memory": ADMIN,
     # The console's pages.
     "console_now": VIEWER,
+    "console_now_side": VIEWER,
     "console_observations": VIEWER,
+    "console_observation_card": VIEWER,
     "console_observation": VIEWER,
     "console_sign_in": None,
     "console_begin_session": None,

@@ -12,11 +12,12 @@ from core.descriptors import unit
 from core.encode import Encoder
 from core.errors import Conflict, InvalidInput, Unavailable
 from core.novelty import SCORES, Member
+from core.packing import burst_from_arrays
 from core.reference import MIN_VIEWS, build_reference
 from core.views import Burst, FloatArray
 from service.events import Events
 from store.memory import Memory
-from store.records import Category, Instance
+from store.records import Category, Instance, Observation
 
 OVERVIEW = "pooled_best_view"
 """Stands in for `best`, whose evidence depends on what else is known."""
@@ -81,6 +82,29 @@ class Curation:
         self._events.publish("category_split", id=category.id, name=name, split_from=category_id)
         return category
 
+    def correct(self, observation_id: str, category_id: str | None, name: str | None = None, *, actor: str | None = None) -> Observation:
+        """An observation was of another category than was answered; of a new one, made of its own views, where that is None.
+
+        Its burst joins that category, and leaves the one it had joined. Raises NotFound, Conflict where it is there already or cannot
+        make a category.
+        """
+        encoded = burst_from_arrays(self._memory.observations.features(observation_id))
+        if category_id is not None:
+            self._memory.categories.get(category_id)
+            self._memory.corrections.to_category(observation_id, category_id, encoded, actor=actor)
+        else:
+            burst = self._memory.observations.burst(observation_id)
+            sound = _sound(burst)
+            if len(sound) < MIN_VIEWS:
+                raise Conflict(
+                    f"the views of observation {observation_id!r} cannot make a category: that takes at least {MIN_VIEWS} with cameras and "
+                    "depth; scan the object instead (POST /v1/scans)"
+                )
+            reference = build_reference(encoded.select(sound))
+            category_id = self._memory.corrections.to_new(observation_id, reference, burst.select(sound), encoded, name=name, actor=actor)
+        self._events.publish("observation_corrected", id=observation_id, category_id=category_id)
+        return self._memory.observations.get(observation_id)
+
     def forget_instance(self, category_id: str, instance_id: str, *, actor: str | None = None) -> None:
         """Takes a burst out of a category. Raises NotFound, Conflict for its last one."""
         self._memory.instances.forget(category_id, instance_id, actor=actor)
@@ -110,13 +134,18 @@ class Curation:
             if not self._memory.instances.get(instance_id).kept:
                 continue
             burst = self._memory.instances.burst(instance_id)
-            sound = [index for index, view in enumerate(burst.views) if view.camera is not None and view.depth_m is not None]
+            sound = _sound(burst)
             if len(sound) >= MIN_VIEWS:
                 return burst.select(sound)
         raise Conflict(
             f"none of these instances can be a reference: that takes the kept views of one, at least {MIN_VIEWS} with cameras and depth; "
             "scan the object instead"
         )
+
+
+def _sound(burst: Burst) -> list[int]:
+    """Views that a reference can be made of."""
+    return [index for index, view in enumerate(burst.views) if view.camera is not None and view.depth_m is not None]
 
 
 def _tokens(member: Member, token: str) -> FloatArray:

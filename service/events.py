@@ -12,6 +12,7 @@ from typing import Any, Literal
 
 Kind = Literal[
     "observation",
+    "observation_corrected",
     "scan_begun",
     "scan_views",
     "scan_changed",

@@ -13,7 +13,7 @@ from store.connection import Connection, Row, new_id, only
 from store.records import Action, AuditEntry
 from store.retention import ago, now
 
-UNDOABLE: tuple[Action, ...] = ("rename", "merge", "split", "delete", "forget")
+UNDOABLE: tuple[Action, ...] = ("rename", "merge", "split", "delete", "forget", "correct")
 
 
 class Audit:

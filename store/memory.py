@@ -27,6 +27,7 @@ from store.backup import Backup, back_up
 from store.categories import Categories
 from store.check import CheckReport, Progress, Sizes, check, sizes
 from store.connection import DATABASE, Connection
+from store.corrections import Corrections
 from store.goals import Goals
 from store.imports import Import, import_archive
 from store.instances import Instances
@@ -59,6 +60,7 @@ class Memory:
         self.audit = Audit(connection)
         self.keys = Keys(connection)
         self.sessions = Sessions(connection)
+        self.corrections = Corrections(connection)
 
     @classmethod
     def open(cls, folder: Path, retention: Retention | None = None) -> Memory:

@@ -17,7 +17,7 @@ from core.novelty import Decision
 from core.scan import ScanRequest
 from core.views import Burst, View
 from store.arrays import Array, arrays_file, read_arrays, write_arrays
-from store.bursts import read_view, write_burst
+from store.bursts import read_burst, read_view, write_burst
 from store.columns import (
     decision_from_json,
     decision_to_json,
@@ -36,8 +36,10 @@ from store.retention import ahead, now
 from store.scans import insert_scan
 
 SELECT = """
-    SELECT o.*, c.id AS living_category_id, (SELECT s.id FROM scans s WHERE s.observation_id = o.id ORDER BY s.rowid LIMIT 1) AS scan_id
+    SELECT o.*, c.id AS living_category_id, k.id AS living_corrected_to,
+    (SELECT s.id FROM scans s WHERE s.observation_id = o.id ORDER BY s.rowid LIMIT 1) AS scan_id
     FROM observations o LEFT JOIN categories c ON c.id = o.category_id AND c.removed_by IS NULL
+    LEFT JOIN categories k ON k.id = o.corrected_to AND k.removed_by IS NULL
 """
 FEATURES = "features.npz"
 
@@ -101,7 +103,7 @@ class Observations:
             if request is not None:
                 insert_scan(db, new_id(), request, observation_id, ahead(self._connection.retention.scans))
             if joins is not None:
-                _require_living(db, joins.category_id)
+                require_living(db, joins.category_id)
                 insert_instance(
                     db,
                     joins.category_id,
@@ -154,6 +156,10 @@ class Observations:
             raise NotFound(f"observation {observation_id!r} has the views 0 to {observation.views - 1}, not {index}")
         return read_view(self.folder(observation_id), index)
 
+    def burst(self, observation_id: str) -> Burst:
+        """All its views. Raises NotFound."""
+        return read_burst(self.folder(self.get(observation_id).id))
+
     def features(self, observation_id: str) -> dict[str, Array]:
         """The arrays it was kept with. Raises NotFound, and Unavailable where their file is damaged."""
         rows = self._connection.rows("SELECT files FROM observations WHERE id = ?", self.get(observation_id).id)
@@ -180,7 +186,7 @@ class Observations:
         return dropped
 
 
-def _require_living(db: Database, category_id: str) -> None:
+def require_living(db: Database, category_id: str) -> None:
     """Raises Conflict for a category that is gone, or that was deleted or merged and could still be brought back."""
     if db.execute("SELECT 1 FROM categories WHERE id = ? AND removed_by IS NULL", [category_id]).fetchone() is None:
         raise Conflict(f"category {category_id!r} was deleted or merged meanwhile; send the request again")
@@ -223,4 +229,5 @@ def _observation(row: Row) -> Observation:
         row["features_sha256"],
         grounds_from_json(row["grounds"]) if row["grounds"] else None,
         np.array(json.loads(row["viewpoints"])).reshape(-1, 4, 4) if row["viewpoints"] else None,
+        row["living_corrected_to"],
     )

@@ -22,7 +22,7 @@ ScanState = Literal["requested", "collecting", "completed", "expired"]
 Anchor = Literal["center", "base"]
 Assignment = Literal["scan", "decision", "named"]
 """How a burst came to a category: by the scan it was learnt from, by the decision, or by the caller's word."""
-Change = Literal["create", "rename", "merge", "split", "delete", "forget", "import", "reembed", "undo"]
+Change = Literal["create", "rename", "merge", "split", "delete", "forget", "import", "reembed", "undo", "correct"]
 """Of what was learnt."""
 Errand = Literal["calibrate", "backup", "export", "key", "revoke"]
 """What else only an admin may do; `key` and `revoke` are a key's beginning and end."""
@@ -187,3 +187,5 @@ class Observation:
     """How much the answer rests on; None where an earlier version did not record it."""
     viewpoints: NDArray[np.floating] | None = None
     """Of an uncertain object where to look next, world_from_camera in the burst's world, most telling first, shape (n, 4, 4)."""
+    corrected_to: str | None = None
+    """The category that a person said it was of; None where nobody did, or where that category was deleted since."""

@@ -205,5 +205,13 @@ def m005_keys(db: Database) -> None:
     )
 
 
+@migrations()
+def m006_corrections(db: Database) -> None:
+    """What a person said an observation was of; and observations are found by outcome and category, however many there are."""
+    db.table("observations").add_column("corrected_to", str)
+    for table, column in (("observations", "outcome"), ("observations", "category_id"), ("instances", "source_id")):
+        db.table(table).create_index([column])
+
+
 def _reference(table: str, column: str, other_table: str, on_delete: str) -> ForeignKey:
     return ForeignKey(table, column, other_table, "id", on_delete=on_delete)

@@ -10,6 +10,7 @@ from core.errors import Conflict
 from store.audit import UNDOABLE, record
 from store.categories import move_instances
 from store.connection import Connection, new_id
+from store.corrections import undo_correction
 from store.records import Action, AuditEntry
 
 
@@ -72,5 +73,6 @@ REVERSE: dict[Action, Callable[[Database, AuditEntry, str], bool]] = {
     "forget": _forget,
     "merge": _merge,
     "split": _split,
+    "correct": undo_correction,
 }
 """Each returns whether things were as the change left them."""

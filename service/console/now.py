@@ -35,7 +35,7 @@ class ScanShown:
 
 
 @router.get("/")
-def console_now(request: Request, agent: AgentDep) -> HTMLResponse:
+def now(request: Request, agent: AgentDep) -> HTMLResponse:
     """The latest observations, the scans in progress, and what changed."""
     heard = agent.events.last_id  # before anything is read: what happens meanwhile is told once more, never missed
     return render(
@@ -52,7 +52,7 @@ def console_now(request: Request, agent: AgentDep) -> HTMLResponse:
 
 
 @router.get("/now/side")
-def console_now_side(request: Request, agent: AgentDep) -> HTMLResponse:
+def now_side(request: Request, agent: AgentDep) -> HTMLResponse:
     """What is beside the observations, again."""
     return render(request, "now_side.html", scans=_scans(agent), changes=agent.memory.audit.latest(CHANGES), names=agent.names())
 

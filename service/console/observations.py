@@ -17,7 +17,7 @@ PAGE = 24
 
 
 @router.get("")
-def console_observations(
+def observations(
     request: Request,
     agent: AgentDep,
     before: Annotated[str | None, Query()] = None,
@@ -39,12 +39,12 @@ def console_observations(
 
 
 @router.get("/{observation_id}")
-def console_observation(request: Request, observation_id: str, agent: AgentDep) -> HTMLResponse:
+def observation(request: Request, observation_id: str, agent: AgentDep) -> HTMLResponse:
     """One of them, with everything that its answer rests on."""
     return render(request, "observation.html", observation=agent.memory.observations.get(observation_id), names=agent.names())
 
 
 @router.get("/{observation_id}/card")
-def console_observation_card(request: Request, observation_id: str, agent: AgentDep) -> HTMLResponse:
+def observation_card(request: Request, observation_id: str, agent: AgentDep) -> HTMLResponse:
     """As it is in lists."""
     return render(request, "observation_card.html", observation=agent.memory.observations.get(observation_id), names=agent.names())

@@ -9,14 +9,14 @@ from fastapi import APIRouter, Query, Response
 from core.errors import InvalidInput
 from core.views import Burst
 from service.agent import Agent
-from service.deps import AgentDep, UploadDep, WorkDep
+from service.deps import ActorDep, AgentDep, UploadDep, WorkDep
 from service.exchange import MemoryRoute
 from service.features import pose_details_from_arrays
 from service.gallery import ObservationGallery
 from service.routes.png import PNG_RESPONSES, Side, png
 from service.routes.scans import scan_answer
 from service.schemas.bursts import BURST_BODY
-from service.schemas.observations import AnswerQuery, Debug, NewObservationQuery, Observation, ObservationList
+from service.schemas.observations import AnswerQuery, Correction, Debug, NewObservationQuery, Observation, ObservationList
 from service.schemas.problem import problems
 from service.schemas.vision_msgs import Detection3DArray
 from store import records
@@ -52,6 +52,15 @@ def list_observations(
 def get_observation(observation_id: str, query: Annotated[AnswerQuery, Query()], agent: AgentDep) -> Answer:
     """What was answered then."""
     return _answer(agent, agent.memory.observations.get(observation_id), query)
+
+
+@router.post("/{observation_id}/correct", responses=problems(404, 409, 422, 503))
+async def correct_observation(
+    observation_id: str, correction: Correction, agent: AgentDep, work: WorkDep, actor: ActorDep = None
+) -> Observation:
+    """Says what it was really of: its burst joins that category and leaves the one it had joined; null makes a new one of its views."""
+    said = correction.category_id, correction.name
+    return await work.run(lambda: _observation(agent, agent.curation.correct(observation_id, *said, actor=actor)))
 
 
 @router.get("/{observation_id}/rgb.png", response_class=Response, responses=PNG_RESPONSES)
@@ -102,7 +111,7 @@ def observation(agent: Agent, observation_id: str) -> Observation:
     return _observation(agent, agent.memory.observations.get(observation_id))
 
 
-MADE = {"/v1/observations": observation}
+MADE = {"/v1/observations": observation, "/v1/observations/{observation_id}/correct": observation}
 """What a repeated request is answered with where its first answer was lost."""
 
 

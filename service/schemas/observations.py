@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
 from core.pose import PoseOptions
 from core.sim3 import Sim3
@@ -212,6 +212,7 @@ class Observation(BaseModel):
     scan_error: str | None = Field(description="Why a novel object has no scan.")
     grounds: Grounds | None = Field(description="How much the answer rests on; null where an earlier version did not record it.")
     timings_ms: dict[str, float] = Field(description="Milliseconds of each stage, and their `total`.")
+    corrected_to: str | None = Field(description="The category that somebody said it was of, by `correct`.")
     debug: Debug | None = Field(None, description="Where `include=debug` asked for it.")
 
     @staticmethod
@@ -249,8 +250,24 @@ class Observation(BaseModel):
             scan_error=observation.scan_error,
             grounds=Grounds.of(observation.grounds) if observation.grounds else None,
             timings_ms=observation.timings_ms,
+            corrected_to=observation.corrected_to,
             debug=debug,
         )
+
+
+class Correction(BaseModel):
+    """What an observation was really of."""
+
+    model_config = ConfigDict(extra="forbid", json_schema_extra={"example": {"category_id": "4be0643f1d98573b97cdca98a65347dd"}})
+
+    category_id: str | None = Field(description="The right category; null for a new one, made of the observation's own views.")
+    name: str | None = Field(None, min_length=1, max_length=200, description="Of the new category.", examples=["cup"])
+
+    @model_validator(mode="after")
+    def _only_new_ones_are_named(self) -> Correction:
+        if self.category_id is not None and self.name is not None:
+            raise ValueError("name is of a new category; PATCH /v1/categories/{id} names one that there is")
+        return self
 
 
 class ObservationList(BaseModel):

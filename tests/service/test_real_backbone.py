@@ -122,7 +122,16 @@ def test_every_endpoint_answers(http, called, parts, scanned, category, seen):
     for name in ("rgb", "foreground", "pca", "overlay", "correspondences"):
         assert picture.match(http.get(f"/v1/observations/{seen['id']}/{name}.png").headers["content-type"])
     assert http.get(f"/v1/observations/{seen['id']}").json() == seen
-    for read in ("/v1/observations", "/v1/categories", path, f"{path}/cloud.ply", f"{path}/similarity", "/v1/memory", "/v1/info", "/v1/scans"):
+    for read in (
+        "/v1/observations",
+        "/v1/categories",
+        path,
+        f"{path}/cloud.ply",
+        f"{path}/similarity",
+        "/v1/memory",
+        "/v1/info",
+        "/v1/scans",
+    ):
         http.get(read)
     for probe in ("/healthz", "/readyz", "/metrics"):
         http.get(probe)
@@ -142,6 +151,8 @@ def test_every_endpoint_answers(http, called, parts, scanned, category, seen):
     named = http.post("/v1/observations", files=two, params={"category_id": category["id"]}).json()
     instance = http.get(f"{path}/instances").json()["instances"][-1]
     assert instance["source_id"] == named["id"]
+    http.post(f"/v1/observations/{named['id']}/correct", json={"category_id": None})
+    http.post(f"/v1/memory/audit/{http.get('/v1/memory/audit').json()['entries'][0]['id']}/undo")
     split = http.post(f"{path}/split", json={"instance_ids": [instance["id"]]}).json()
     http.post(f"{path}/merge", json={"from": split["id"]})
     http.delete(f"{path}/instances/{instance['id']}")
