@@ -11,21 +11,19 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.encoded import encode_all, read_encoded
-from benchmarks.pairs import Pair, ViewCounts, choose_views, sample_pairs
+from benchmarks.pair_jobs import PairJob, pair_jobs
+from benchmarks.pairs import ViewCounts
 from benchmarks.parallel import map_jobs
 from benchmarks.tables import print_table, write_json
-from clients.datasets.sources import find_sequences
-from clients.pose_error import rotation_error_deg
 from core.backbones.dino import load_backbone
 from core.encode import Encoder
 from core.errors import NoPose
 from core.hypotheses import HypothesesConfig
 from core.pose import VARIANTS, BestConfig, PoseConfig, PoseEstimator
-from core.reference import build_reference
 
 _BEST = BestConfig()
 _GUESSES = HypothesesConfig()
+ORACLE = "the hypothesis nearest the truth"
 CHANGES = {
     "best": _BEST,
     "refined by principal components": replace(_BEST, steady=False),
@@ -34,20 +32,9 @@ CHANGES = {
     "no hypotheses of single pairs": replace(_BEST, hypotheses=replace(_GUESSES, single_pairs=0, aligned_pairs=1)),
     "no hypotheses of clusters": replace(_BEST, hypotheses=replace(_GUESSES, clusters=0)),
     "no polish": replace(_BEST, polish=None),
-    "the hypothesis nearest the truth": replace(_BEST, alternatives=_BEST.refined, alternative_deg=_BEST.distinct_deg),
+    ORACLE: replace(_BEST, alternatives=_BEST.refined, alternative_deg=_BEST.distinct_deg),
 }
 """Of the last, the best alternative counts too."""
-ORACLE = "the hypothesis nearest the truth"
-
-
-@dataclass(frozen=True)
-class Job:
-    """One pair."""
-
-    pair: Pair
-    files: tuple[Path, Path]
-    views: ViewCounts
-    seed: int
 
 
 @dataclass(frozen=True)
@@ -70,15 +57,11 @@ def run(data: Path, views: Sequence[str], limit: int, json: Path | None, seed: i
     Raises InvalidInput for bad view counts, or data without pairs or ground truth.
     """
     network = load_backbone(backbone)
-    pairs = sample_pairs(find_sequences(data), limit, seed)
-    sequences = list(dict.fromkeys(sequence for pair in pairs for sequence in pair))
-    files = dict(zip((sequence.key for sequence in sequences), encode_all(sequences, Encoder(network)), strict=True))
-    counts = [ViewCounts.parse(text) for text in views]
-    jobs = [Job((a, b), (files[a.key], files[b.key]), count, seed) for count in counts for a, b in pairs]
+    jobs = pair_jobs(data, views, limit, seed, Encoder(network))
     errors = map_jobs(solve, jobs, lambda job: 1, "solving")
     rows = [
         _row(change, count, [(job.pair[0].category, error[change]) for job, error in zip(jobs, errors, strict=True) if job.views == count])
-        for count in counts
+        for count in dict.fromkeys(job.views for job in jobs)
         for change in CHANGES
     ]
     if json is not None:
@@ -88,28 +71,16 @@ def run(data: Path, views: Sequence[str], limit: int, json: Path | None, seed: i
     return rows
 
 
-def solve(job: Job) -> dict[str, float]:
+def solve(job: PairJob) -> dict[str, float]:
     """The rotation error of one pair under every change, degrees; 180 for a refused pose."""
-    sides = zip(job.files, job.pair, ("reference", "target"), (job.views.reference, job.views.target), strict=True)
-    reference, target = (
-        read_encoded(file).select(choose_views(sequence.name, role, len(sequence.images), count, job.seed))
-        for file, sequence, role, count in sides
-    )
-    learnt = build_reference(reference)
-    truths = [sequence.world_from_model for sequence in job.pair]
-    assert truths[0], "sample_pairs requires ground truth"
-    assert truths[1], "sample_pairs requires ground truth"
+    reference, target = job.reference(), job.target()
     errors = {}
     for change, config in CHANGES.items():
         try:
-            estimate = PoseEstimator(_config(config)).estimate(learnt, target, seed=job.seed)
+            found = job.errors_deg(PoseEstimator(_config(config)).estimate(reference, target, seed=job.seed))
         except NoPose:
-            errors[change] = 180.0
-            continue
-        rivals = estimate.alternatives if change == ORACLE else ()
-        transforms = [estimate.target_from_reference, *(each.target_from_reference for each in rivals)]
-        found = [rotation_error_deg(each.rotation, truths[0], truths[1], job.pair[1].symmetries) for each in transforms]
-        errors[change] = min(found)
+            found = [180.0]
+        errors[change] = min(found) if change == ORACLE else found[0]
     return errors
 
 

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from benchmarks.cached import code_hash, write
 from benchmarks.encoded import read_encoded
 from benchmarks.parallel import map_jobs
+from core.agreement import agreeing
 from core.backbones.weights import cache_folder
 from core.backbones.whitening import Whitening
 from core.encode import EncodedBurst
@@ -33,6 +34,7 @@ FloatArray = NDArray[np.floating[Any]]
 VIEWS = 8
 """Of a longer burst so many, evenly spaced, stand for it: a robot's burst is about as long, and a solve takes less time."""
 SOURCES = (
+    "agreement.py",
     "boxes.py",
     "correspond.py",
     "dense.py",
@@ -92,7 +94,7 @@ def few_views(burst: EncodedBurst) -> EncodedBurst:
     """At most VIEWS of the views that show an object, evenly spaced."""
     shown = [index for index, view in enumerate(burst.views) if len(view.cells)]
     chosen = np.unique(np.linspace(0, len(shown) - 1, min(VIEWS, len(shown))).round().astype(int))
-    return burst.select([shown[index] for index in chosen])
+    return agreeing(burst.select([shown[index] for index in chosen]))
 
 
 @cache

@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from numpy.typing import NDArray
 from benchmarks.cached import code_hash, write
 from benchmarks.parallel import bar
 from clients.datasets import folders
+from core.agreement import agreeing
 from core.backbones.weights import cache_folder
 from core.encode import EncodedBurst, Encoder
 from core.packing import burst_as_arrays, burst_from_arrays
@@ -50,6 +52,14 @@ def read_encoded(file: Path) -> EncodedBurst:
     with np.load(file, allow_pickle=False) as arrays:
         stage_ms = dict(zip(arrays["stages"].tolist(), arrays["stage_ms"].tolist(), strict=True))
         return replace(burst_from_arrays(arrays), stage_ms=stage_ms)
+
+
+def read_views(file: Path, indices: list[int]) -> EncodedBurst:
+    """The views at `indices` alone, as the service would have them of a robot that sent no others."""
+    return agreeing(_cached(file).select(indices))
+
+
+_cached = lru_cache(maxsize=16)(read_encoded)
 
 
 def _key(sequence: folders.Sequence, encoder: Encoder) -> str:

@@ -18,13 +18,14 @@ import numpy as np
 
 from benchmarks.box_iou import Parallelepiped, box_iou
 from benchmarks.contenders import Found, Setting, Sweep
-from benchmarks.encoded import encode_all, read_encoded
+from benchmarks.encoded import encode_all, read_encoded, read_views
 from benchmarks.pairs import Pair, ViewCounts, choose_views, sample_pairs
 from benchmarks.parallel import map_jobs, worker_count
 from benchmarks.tables import print_table, write_json
 from clients.datasets import folders
 from clients.datasets.sources import find_sequences
 from clients.pose_error import NO_POSE, PoseError, accuracy, median, pose_error, rotation_error_deg
+from core.agreement import agreeing
 from core.backbones.dino import load_backbone
 from core.boxes import remove_outliers
 from core.encode import EncodedBurst, Encoder
@@ -246,10 +247,7 @@ def _jobs(setting: Setting, pairs: Sequence[Pair], files: dict[str, Path], seed:
 
 def _select(job: Job, sequence: folders.Sequence, role: str, count: int | None) -> EncodedBurst:
     indices = choose_views(sequence.name, role, len(sequence.images), count, job.seed)
-    return _cached(job.files[sequence.key]).select(indices)
-
-
-_cached = lru_cache(maxsize=16)(read_encoded)
+    return read_views(job.files[sequence.key], indices)
 
 
 def _score(found: Found | None, job: Job, sequence: folders.Sequence) -> tuple[PoseError, float, int]:
@@ -277,4 +275,4 @@ def _model_box(job: Job, sequence: folders.Sequence, world_from_model: Sim3) -> 
 @lru_cache(maxsize=16)
 def _measured(file: Path) -> FloatArray:
     """The cloud of all views without outliers."""
-    return remove_outliers(_cached(file).cloud_m)
+    return remove_outliers(agreeing(read_encoded(file)).cloud_m)

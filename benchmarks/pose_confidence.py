@@ -17,34 +17,18 @@ import numpy as np
 import typer
 from numpy.typing import NDArray
 
-from benchmarks.encoded import encode_all, read_encoded
-from benchmarks.pairs import ViewCounts, choose_views, sample_pairs
+from benchmarks.pair_jobs import PairJob, pair_jobs
 from benchmarks.parallel import map_jobs
 from benchmarks.tables import print_table, write_json
-from clients.datasets.folders import Sequence as Recording
-from clients.datasets.sources import find_sequences
-from clients.pose_error import rotation_error_deg
 from core.backbones.dino import load_backbone
 from core.confidence import SHIPPED, Confidence, evidence
 from core.encode import Encoder
 from core.errors import NoPose
 from core.pose import VARIANTS, PoseEstimator
-from core.reference import build_reference
 
 RIGHT_DEG = 30.0
 BINS = 5
 """Of the plot, with as many poses each."""
-
-
-@dataclass(frozen=True)
-class Job:
-    """One pair under one number of views."""
-
-    reference: Recording
-    target: Recording
-    files: tuple[Path, Path]
-    views: ViewCounts
-    seed: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,8 +59,9 @@ def main(
         typer.echo(f"wrote {SHIPPED.name} from {len(samples)} poses")
         Confidence.shipped.cache_clear()
     judged = _judge(data, encoder, views, limit, seed)
-    best = np.array([Confidence.shipped().probability(each.evidence)[0] for each in judged]), np.array([each.right[0] for each in judged])
-    rows_of = [asdict(row) for row in reliability(*best)]
+    confidence = np.array([Confidence.shipped().probability(each.evidence)[0] for each in judged])
+    right = np.array([each.right[0] for each in judged])
+    rows = [asdict(row) for row in reliability(confidence, right)]
     out.mkdir(parents=True, exist_ok=True)
     meta = {
         "data": data,
@@ -84,11 +69,11 @@ def main(
         "limit": limit,
         "seed": seed,
         "poses": len(judged),
-        "brier": float(np.mean((best[0] - best[1]) ** 2)),
+        "brier": float(np.mean((confidence - right) ** 2)),
     }
-    write_json(out / "reliability.json", meta, rows_of)
-    _plot(out / "reliability.png", rows_of, f"{len(judged)} poses, Brier score {meta['brier']:.3f}")
-    print_table("Confidence", rows_of, list(rows_of[0]))
+    write_json(out / "reliability.json", meta, rows)
+    _plot(out / "reliability.png", rows, f"{len(judged)} poses, Brier score {meta['brier']:.3f}")
+    print_table("Confidence", rows, list(rows[0]))
 
 
 @dataclass(frozen=True)
@@ -114,38 +99,21 @@ def _bin(confidence: NDArray[np.floating], right: NDArray[np.bool_]) -> Bin:
     return Bin(float(confidence.min()), float(confidence.max()), float(confidence.mean()), 100 * float(right.mean()), len(right))
 
 
-def judge(job: Job) -> Judged | None:
+def judge(job: PairJob) -> Judged | None:
     """The hypotheses of one pair against the truth; None where no pose was found."""
-    seen = [
-        read_encoded(file).select(choose_views(sequence.name, role, len(sequence.images), count, job.seed))
-        for file, sequence, role, count in (
-            (job.files[0], job.reference, "reference", job.views.reference),
-            (job.files[1], job.target, "target", job.views.target),
-        )
-    ]
-    reference = build_reference(seen[0])
+    reference, target = job.reference(), job.target()
     try:
-        estimate = PoseEstimator(VARIANTS["best"]).estimate(reference, seen[1], seed=job.seed)
+        estimate = PoseEstimator(VARIANTS["best"]).estimate(reference, target, seed=job.seed)
     except NoPose:
         return None
     assert estimate.score is not None, "of the variant best"
-    truths = job.reference.world_from_model, job.target.world_from_model
-    assert truths[0], "sample_pairs requires ground truth"
-    assert truths[1], "sample_pairs requires ground truth"
-    rotations = [
-        each.rotation for each in (estimate.target_from_reference, *(each.target_from_reference for each in estimate.alternatives))
-    ]
-    errors = [rotation_error_deg(rotation, truths[0], truths[1], job.target.symmetries) for rotation in rotations]
     scores = np.array([estimate.score, *(each.score for each in estimate.alternatives)])
-    return Judged(evidence(scores, len(seen[1].views)), np.array(errors) <= RIGHT_DEG)
+    return Judged(evidence(scores, len(target.views)), np.array(job.errors_deg(estimate)) <= RIGHT_DEG)
 
 
 def _judge(data: str, encoder: Encoder, views: Sequence[str], limit: int, seed: int) -> list[Judged]:
-    pairs = sample_pairs(find_sequences(Path(data)), limit, seed)
-    sequences = list(dict.fromkeys(sequence for pair in pairs for sequence in pair))
-    files = dict(zip((sequence.key for sequence in sequences), encode_all(sequences, encoder), strict=True))
-    jobs = [Job(a, b, (files[a.key], files[b.key]), ViewCounts.parse(count), seed) for count in views for a, b in pairs]
-    return [each for each in map_jobs(judge, jobs, lambda job: 1, "solving") if each is not None]
+    judged = map_jobs(judge, pair_jobs(data, views, limit, seed, encoder), lambda job: 1, "solving")
+    return [each for each in judged if each is not None]
 
 
 def _plot(file: Path, rows: Sequence[dict[str, float]], title: str) -> None:

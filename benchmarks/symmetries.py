@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from rich.progress import track
 
-from benchmarks.encoded import encode_all, read_encoded
+from benchmarks.encoded import encode_all, read_encoded, read_views
 from benchmarks.tables import print_table, write_json
 from clients.datasets import folders
 from clients.datasets.sources import find_sequences
@@ -92,6 +92,6 @@ def _sum(category: str, rows: Sequence[SymmetryRow]) -> SymmetryRow:
 
 
 def _claimed(file: Path, views: int) -> FloatArray:
-    encoded = read_encoded(file)
-    chosen = np.linspace(0, len(encoded.views) - 1, min(views, len(encoded.views))).round().astype(int).tolist()
-    return build_reference(encoded.select(chosen)).symmetries
+    count = len(read_encoded(file).views)
+    chosen = np.linspace(0, count - 1, min(views, count)).round().astype(int).tolist()
+    return build_reference(read_views(file, chosen)).symmetries
