@@ -54,11 +54,13 @@ def simulate(
     output = Output(out)
     out.mkdir(parents=True, exist_ok=True)
     if resume:
-        output.earlier(plan)
+        output.earlier_lessons(plan) if plan.teacher else output.earlier(plan)
     screen = errors if json else console
     with service(url, out, fresh=not resume) as address:
         summary: Any = (
-            run_lessons(plan, address, output, screen) if plan.teacher else run_episode(plan, address, output, screen, resume=resume)
+            run_lessons(plan, address, output, screen, resume=resume)
+            if plan.teacher
+            else run_episode(plan, address, output, screen, resume=resume)
         )
     if json:
         print_json(asdict(summary))

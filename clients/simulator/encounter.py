@@ -61,6 +61,7 @@ class Encounter:
     category: str
     """Its true category."""
     observation_id: str
+    """Empty where the service saw no object, and kept nothing."""
     outcome: str
     verdict: Verdict
     category_id: str | None
@@ -125,6 +126,11 @@ class Encounter:
                 "view_faults": tuple(fields["view_faults"]),
             }
         )
+
+    @property
+    def label(self) -> str:
+        """Its number, and before it of which robot it is, where it is not the first one's."""
+        return f"{self.robot + 1}.{self.number}" if self.robot else str(self.number)
 
     @property
     def founder(self) -> Founder:

@@ -8,11 +8,11 @@ from __future__ import annotations
 import random
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Sequence, Set
 from dataclasses import dataclass, field
 
 from clients.answers import Category
-from clients.errors import ClientError
+from clients.errors import ClientError, NoObjectProblem
 from clients.pose_error import PoseError, pose_error
 from clients.robot import Observation, RobotClient
 from clients.simulator.arm import FREE, Arm, ArmConfig
@@ -100,7 +100,10 @@ class Episode:
         arm.offsets_deg.clear()
         in_memory = self._truth.has(thing.category)
         started = time.perf_counter()
-        seen, burst, looks = observe_until_sure(self._robot, arm, burst)
+        try:
+            seen, burst, looks = observe_until_sure(self._robot, arm, burst)
+        except NoObjectProblem as problem:
+            seen, looks = _nothing_seen(problem), 1
         observe_ms = (time.perf_counter() - started) * 1e3
         founder = self._truth.founder(seen.category_id)
         verdict = judge(seen.outcome, thing.category, founder, in_memory)
@@ -164,9 +167,8 @@ def observe_until_sure(robot: RobotClient, arm: Arm, burst: Burst, *, learn: boo
     return seen, burst, looks
 
 
-def require_own_memory(robot: RobotClient, done: Sequence[Encounter]) -> None:
-    """Raises ClientError where the service's memory holds categories that the encounters so far did not make."""
-    own = {each.learnt for each in done}
+def require_own_memory(robot: RobotClient, own: Set[str | None]) -> None:
+    """Raises ClientError where the service's memory holds categories other than those that this run has made so far."""
     if {each.id for each in robot.categories()} - own:
         remedy = "start one with `onelook serve --data-dir NEW_FOLDER`"
         raise ClientError(f"the service's memory is not empty, so decisions could not be scored; {remedy}")
@@ -177,6 +179,11 @@ def shuffled(subjects: Sequence[Subject], seed: int) -> list[Subject]:
     order = list(subjects)
     random.Random(seed).shuffle(order)
     return order
+
+
+def _nothing_seen(problem: NoObjectProblem) -> Observation:
+    """In place of an observation that there is none of: the robot goes on to the next object."""
+    return Observation("", "uncertain", None, None, None, str(problem), None, None, (), None, {"total": 0.0}, {})
 
 
 def _carry_out(seen: Observation, arm: Arm, report: ScanReport) -> tuple[Category | None, str | None]:

@@ -66,7 +66,7 @@ def disagreements(robot: RobotClient, encounters: Sequence[Encounter]) -> list[s
             found.append(f"{encounter.name}: its category holds {category.instances} bursts; {joined} joined the first one")
         if category.views != encounter.learnt_views:
             found.append(f"{encounter.name}: its category has {category.views} views; it was learnt from {encounter.learnt_views}")
-    seen = [each.observation_id for each in encounters]
+    seen = [each.observation_id for each in encounters if each.observation_id]
     if len(set(seen)) < len(seen):
         found.append(f"{len(seen) - len(set(seen))} observations were given to two encounters")
     return found

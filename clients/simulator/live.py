@@ -70,7 +70,8 @@ def lesson_line(lesson: Lesson) -> Text:
         )
     else:
         answer = f"answered {lesson.answer or 'that it does not know'}"
-        done = Text(answer, style="green") if lesson.right else Text(f"{answer}, corrected", style="red")
+        wrong = f"{answer}, corrected" if lesson.corrected else f"gave no answer: {lesson.failure}"
+        done = Text(answer, style="green") if lesson.right else Text(wrong, style="red")
     accuracy = "" if lesson.accuracy is None else f"  {100 * lesson.accuracy:.0f} % right lately"
     return Text.assemble(f"{lesson.number:>4}  {lesson.known:>3} known  {lesson.name:<22} ", done, (accuracy, "dim"))
 
@@ -139,7 +140,7 @@ def _row(stages: Sequence[str], encounter: Encounter | None = None, *, header: b
     table.add_column("#", justify="right", width=4)
     for heading, width in (("object", 22), ("decision", 22)):
         table.add_column(heading, width=width, no_wrap=True)
-    table.add_column("similarity", justify="right", width=13)
+    table.add_column("similarity", justify="right", width=14)
     table.add_column("rotation", justify="right", width=8)
     for stage in stages:
         table.add_column(f"{stage} ms", justify="right", width=max(7, len(stage) + 3), style="dim")
@@ -153,8 +154,7 @@ def _cells(encounter: Encounter, stages: Sequence[str]) -> list[Text | str]:
     spent = {**stage_ms(encounter), "total": encounter.timings_ms["total"]}
     times = [f"{spent[stage]:.0f}" if stage in spent else "" for stage in stages]
     scan = "" if encounter.scan_ms is None else f"{encounter.scan_ms / 1e3:.1f}"
-    number = f"{encounter.robot + 1}.{encounter.number}" if encounter.robot else str(encounter.number)
-    return [number, encounter.name, _decision(encounter), similarity(encounter), _rotation(encounter), *times, scan]
+    return [encounter.label, encounter.name, _decision(encounter), similarity(encounter), _rotation(encounter), *times, scan]
 
 
 def _decision(encounter: Encounter) -> Text:

@@ -43,6 +43,8 @@ def fetch_pictures(robot: RobotClient, encounter: Encounter) -> Pictures:
     view = encounter.best_view
 
     def fetch(name: str, side: int | None = None, **which: int) -> str | None:
+        if not encounter.observation_id:
+            return None
         try:
             return data_uri(robot.picture(f"/v1/observations/{encounter.observation_id}/{name}.png", **which), side)
         except NotFoundProblem:

@@ -21,7 +21,7 @@ from clients.simulator.pictures import fetch_pictures
 from clients.simulator.report import EpisodeRecord, shown, write_json, write_report
 from clients.simulator.script import Script
 from clients.simulator.summary import Summary, summarise
-from clients.simulator.teacher import Lessons, TeachingSummary
+from clients.simulator.teacher import Lesson, Lessons, TeachingSummary
 from clients.simulator.world import Subject
 
 
@@ -43,12 +43,20 @@ class Output:
 
     def earlier(self, script: Script) -> list[Encounter]:
         """The encounters of an interrupted run. Raises ClientError where there was none, or it was of another script."""
-        if not self.lines.is_file():
+        return [Encounter.from_json(line) for line in self._resumed(self.lines, script)]
+
+    def earlier_lessons(self, script: Script) -> list[Lesson]:
+        """The same of a teacher's lessons."""
+        return [Lesson(**json.loads(line)) for line in self._resumed(self.lessons, script)]
+
+    def _resumed(self, file: Path, script: Script) -> list[str]:
+        """The whole lines of an interrupted run's file but the first, which has its settings."""
+        if not file.is_file():
             raise ClientError(f"there is no run to resume in {self.folder}; leave out --resume")
-        settings, *rest = self.lines.read_text(encoding="utf-8").splitlines()
+        settings, *rest = file.read_text(encoding="utf-8").splitlines()
         if json.loads(settings) != json.loads(json.dumps(script.as_settings())):
             raise ClientError(f"the run in {self.folder} was of {settings}; resume it with the same settings, or name another --out")
-        return [Encounter.from_json(line) for line in rest if line.endswith("}")]
+        return [line for line in rest if line.endswith("}")]
 
 
 def run_episode(script: Script, url: str, output: Output, console: Console, *, resume: bool = False) -> Summary:
@@ -57,7 +65,7 @@ def run_episode(script: Script, url: str, output: Output, console: Console, *, r
     started = time.perf_counter()
     with ExitStack() as clients:
         robots = [clients.enter_context(RobotClient(url)) for _ in range(script.robots)]
-        require_own_memory(robots[0], done)
+        require_own_memory(robots[0], {each.learnt for each in done})
         truth = Truth()
         conduct = script.conduct()
         episodes = []
@@ -80,15 +88,17 @@ def run_episode(script: Script, url: str, output: Output, console: Console, *, r
     return summary
 
 
-def run_lessons(script: Script, url: str, output: Output, console: Console) -> TeachingSummary:
+def run_lessons(script: Script, url: str, output: Output, console: Console, *, resume: bool = False) -> TeachingSummary:
     """All that the teacher does; returns what the protocol reports."""
     groups: dict[str, list[Subject]] = {}
     for subject in script.subjects():
         groups.setdefault(subject.category, []).append(subject)
+    done = output.earlier_lessons(script) if resume else []
     with RobotClient(url) as robot:
-        require_own_memory(robot, [])
-        lessons = Lessons(robot, lambda category, index: groups[category][index], sorted(groups), script.conduct())
+        require_own_memory(robot, {each.category_id for each in done})
+        lessons = Lessons(robot, lambda category, index: groups[category][index], sorted(groups), script.conduct(), done=done)
         with output.lessons.open("w", encoding="utf-8") as file:
+            file.write(json.dumps(script.as_settings()) + "\n")
             for lesson in lessons:
                 file.write(json.dumps(asdict(lesson)) + "\n")
                 file.flush()

@@ -10,7 +10,7 @@ from __future__ import annotations
 import random
 import time
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -57,6 +57,8 @@ class Lesson:
     similarity: float | None
     failure: str | None
     seconds: float
+    category_id: str | None = None
+    """What the service calls the category that was taught."""
 
 
 @dataclass(frozen=True)
@@ -87,8 +89,14 @@ class Lessons:
         categories: list[str],
         conduct: Conduct,
         config: TeacherConfig | None = None,
+        *,
+        done: Sequence[Lesson] = (),
     ) -> None:
-        """`draw(category, n)` gives the n-th object of a category; raises IndexError where there are no more."""
+        """`draw(category, n)` gives the n-th object of a category; raises IndexError where there are no more.
+
+        Args:
+            done: the lessons of an earlier, interrupted run of the same kind, which are gone over without the robot.
+        """
         self._robot = robot
         self._draw = draw
         self._conduct = conduct
@@ -98,10 +106,12 @@ class Lessons:
         self._ids: dict[str, str] = {}
         self._shown: dict[str, int] = {}
         self._lessons: list[Lesson] = []
+        self._done = deque(done)
         self._learnt = 0
         self._ended: Literal["all learnt", "patience", "no more objects"] = "all learnt"
 
     def __iter__(self) -> Iterator[Lesson]:
+        """All lessons, the earlier ones first."""
         for category in self._categories:
             lesson = self._teach(category)
             yield lesson
@@ -146,6 +156,8 @@ class Lessons:
 
     def _teach(self, category: str) -> Lesson:
         started = time.perf_counter()
+        if self._done:
+            return self._again(category)
         subject, arm = self._next(category)
         failure = None
         try:
@@ -154,19 +166,35 @@ class Lessons:
             failure = str(problem)
         return self._keep("teach", subject, None, failure is None, False, None, None, failure, started)
 
+    def _again(self, category: str) -> Lesson:
+        """A lesson of the earlier run."""
+        lesson = self._done.popleft()
+        self._shown[category] = self._shown.get(category, 0) + 1
+        if lesson.category_id is not None:
+            self._ids[category] = lesson.category_id
+        self._lessons.append(lesson)
+        return lesson
+
     def _ask(self, category: str, last: deque[bool]) -> Lesson:
         started = time.perf_counter()
+        if self._done:
+            last.append(self._done[0].right)
+            return self._again(category)
         subject, arm = self._next(category)
         burst = arm.glance(self._conduct.views, len(self._lessons))
-        seen = self._robot.observe(burst, learn=False)
         names = {category_id: name for name, category_id in self._ids.items()}
-        answer = names.get(seen.category_id or "") if seen.outcome == "known" else None
-        right = answer == category
-        last.append(right)
-        if not right:
-            self._robot.observe(burst, category_id=self._ids[category])
-        similarity = seen.similarities[0].similarity if seen.similarities else None
-        return self._keep("ask", subject, answer, right, not right, sum(last) / len(last), similarity, None, started)
+        answer, similarity, corrected, failure = None, None, False, None
+        try:
+            seen = self._robot.observe(burst, learn=False)
+            similarity = seen.similarities[0].similarity if seen.similarities else None
+            answer = names.get(seen.category_id or "") if seen.outcome == "known" else None
+            if answer != category:
+                self._robot.observe(burst, category_id=self._ids[category])
+                corrected = True
+        except COULD_NOT as problem:
+            failure = str(problem)
+        last.append(answer == category)
+        return self._keep("ask", subject, answer, answer == category, corrected, sum(last) / len(last), similarity, failure, started)
 
     def _next(self, category: str) -> tuple[Subject, Arm]:
         """An object that the robot has not seen, in its world."""
@@ -189,7 +217,19 @@ class Lessons:
     ) -> Lesson:
         number, seconds = len(self._lessons) + 1, time.perf_counter() - started
         lesson = Lesson(
-            number, action, subject.name, subject.category, answer, right, corrected, len(self._ids), accuracy, similarity, failure, seconds
+            number=number,
+            action=action,
+            name=subject.name,
+            category=subject.category,
+            answer=answer,
+            right=right,
+            corrected=corrected,
+            known=len(self._ids),
+            accuracy=accuracy,
+            similarity=similarity,
+            failure=failure,
+            seconds=seconds,
+            category_id=self._ids.get(subject.category) if action == "teach" else None,
         )
         self._lessons.append(lesson)
         return lesson

@@ -17,6 +17,8 @@ SIMILARITY_TOP, SIMILARITY_HEIGHT = 16, 150
 ERROR_TOP, ERROR_HEIGHT = 214, 96
 LABELLED = 16
 """Columns up to this many have room for the objects' kinds."""
+NUMBER_WIDTH = 26
+"""What a number below a column takes: of narrower columns not each is numbered."""
 ERROR_TOP_DEG = 2 * ACC_DEG[0]
 """Height of the error's panel; a pose farther off than this is wrong however far, and its bar ends at the top."""
 
@@ -50,6 +52,7 @@ class Timeline:
 
     def __init__(self, encounters: Sequence[Encounter]) -> None:
         self.encounters = encounters
+        self._places = {id(each): place for place, each in enumerate(encounters)}
         self._step = (WIDTH - LEFT) / max(1, len(encounters))
         asked = [(each, each.similarity) for each in encounters if each.similarity is not None]
         limited = [(each, each.threshold) for each in encounters if each.threshold is not None]
@@ -75,9 +78,14 @@ class Timeline:
         """Whether the columns carry the objects' kinds."""
         return len(self.encounters) <= LABELLED
 
+    @property
+    def numbered(self) -> Sequence[Encounter]:
+        """Those whose columns carry their number."""
+        return self.encounters[:: max(1, round(NUMBER_WIDTH / self._step + 0.5))]
+
     def x(self, encounter: Encounter) -> float:
-        """The middle of an encounter's column."""
-        return round(LEFT + (encounter.number - 0.5) * self._step, 1)
+        """The middle of an encounter's column: they stand in the order in which they happened, whichever robot's they are."""
+        return round(LEFT + (self._places[id(encounter)] + 0.5) * self._step, 1)
 
     def _similarity_y(self, value: float) -> float:
         return round(SIMILARITY_TOP + SIMILARITY_HEIGHT * (self._high - value) / (self._high - self._low), 1)

@@ -9,6 +9,7 @@ import pytest
 from clients.pose_error import PoseError
 from clients.simulator.charts import Confusion, curve, error_rates, pose_histogram, stage_bars, worst
 from clients.simulator.encounter import Encounter, Verdict
+from clients.simulator.timeline import NUMBER_WIDTH, Timeline
 
 BASE = Encounter(
     number=1,
@@ -75,6 +76,20 @@ def test_poses_are_counted_by_error_and_none_is_the_worst() -> None:
     assert counts["5–7.5°"] == 1
     assert counts["120–180°"] == 1
     assert sum(counts.values()) == 2
+
+
+def test_robots_of_one_memory_stand_side_by_side_in_the_timeline() -> None:
+    met = [replace(BASE, robot=robot, number=number) for number in (1, 2) for robot in (0, 1)]
+    timeline = Timeline(met)
+    assert sorted({timeline.x(each) for each in met}) == [timeline.x(each) for each in met]
+    assert [each.label for each in met] == ["1", "2.1", "2", "2.2"]
+
+
+def test_a_long_timeline_numbers_what_it_has_room_for() -> None:
+    timeline = Timeline([replace(BASE, number=number) for number in range(1, 201)])
+    places = [timeline.x(each) for each in timeline.numbered]
+    assert len(places) > 20
+    assert min(after - before for before, after in zip(places, places[1:])) >= NUMBER_WIDTH
 
 
 def test_stages_are_medians() -> None:

@@ -4,21 +4,25 @@ from __future__ import annotations
 
 import io
 from dataclasses import replace
+from typing import Any
 
 import pytest
 from rich.console import Console
 
 from clients.datasets.folders import Sequence, load_burst
-from clients.errors import ClientError
+from clients.errors import ClientError, NoObjectProblem
 from clients.pose_error import PoseError
 from clients.robot import RobotClient
 from clients.simulator.encounter import Encounter, Founder, Verdict, judge
 from clients.simulator.episode import Conduct, Episode, require_own_memory, shuffled
+from clients.simulator.fleet import disagreements
 from clients.simulator.live import show, summary_rows
+from clients.simulator.pictures import fetch_pictures
 from clients.simulator.replay import ReplaySubject
 from clients.simulator.report import EpisodeRecord
 from clients.simulator.scanning import MOST_AGAIN
 from clients.simulator.summary import summarise
+from core.views import Burst
 
 
 @pytest.mark.parametrize(
@@ -89,8 +93,8 @@ def test_a_used_memory_is_refused_unless_the_episode_made_it(robot: RobotClient,
         scan.add(view)
     category = scan.complete()
     with pytest.raises(ClientError, match="not empty"):
-        require_own_memory(robot, [])
-    require_own_memory(robot, [replace(met[0], learnt=category.id)])
+        require_own_memory(robot, set())
+    require_own_memory(robot, {category.id})
 
 
 def test_an_encounter_is_a_line_of_json_and_back(met: list[Encounter]) -> None:
@@ -106,6 +110,25 @@ def test_a_resumed_episode_meets_the_rest_and_knows_who_founded_what(url: str, s
         (second,) = list(Episode(robot, subjects, conduct, done=[Encounter.from_json(first.as_json())]))
     assert (second.number, second.verdict, second.kind) == (2, Verdict.RECOGNISED, samples[0].category)
     assert second.error is not None
+
+
+def test_what_is_not_seen_is_left_undecided_and_the_robot_goes_on(
+    robot: RobotClient, samples: list[Sequence], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    observe, asked = robot.observe, []
+
+    def blind_once(burst: Burst, **options: Any) -> Any:
+        asked.append(burst)
+        if len(asked) == 1:
+            raise NoObjectProblem("views: no view shows an object that stands out", status=422)
+        return observe(burst, **options)
+
+    monkeypatch.setattr(robot, "observe", blind_once)
+    first, second = Episode(robot, [ReplaySubject(each) for each in samples[:2]], Conduct(views=6))
+    assert (first.verdict, first.failure) == (Verdict.UNDECIDED, "views: no view shows an object that stands out")
+    assert second.verdict is Verdict.NEW
+    assert fetch_pictures(robot, first).rgb is None
+    assert disagreements(robot, [first, second]) == []
 
 
 def test_lost_views_never_arrive(robot: RobotClient, samples: list[Sequence]) -> None:

@@ -13,7 +13,7 @@ from clients.simulator.encounter import Verdict
 from clients.simulator.episode import Conduct, Episode, Truth
 from clients.simulator.fleet import disagreements, together
 from clients.simulator.replay import ReplaySubject
-from clients.simulator.teacher import Lessons, TeacherConfig
+from clients.simulator.teacher import Lesson, Lessons, TeacherConfig
 from clients.simulator.world import Subject
 
 
@@ -50,6 +50,20 @@ def test_wrong_answers_are_corrected_until_patience_ends(robot: RobotClient, sam
     summary = lessons.summary
     assert (summary.categories_learnt, summary.corrections, summary.ended) == (0, 2, "patience")
     assert summary.instances_a_category == 3
+
+
+def test_interrupted_lessons_go_on_where_they_stopped(robot: RobotClient, two: dict[str, Sequence]) -> None:
+    def lessons(done: list[Lesson]) -> Lessons:
+        return Lessons(robot, lambda category, index: ReplaySubject(two[category]), list(two), Conduct(views=12), done=done)
+
+    begun = iter(lessons([]))
+    before = [next(begun) for _ in range(3)]
+    again = lessons(before)
+    done = list(again)
+    assert done[:3] == before
+    assert [(each.number, each.action, each.right, each.known) for each in done[3:]] == [(4, "ask", True, 2), (5, "ask", True, 2)]
+    assert len(robot.categories()) == 2
+    assert (again.summary.categories_learnt, again.summary.questions) == (2, 3)
 
 
 def test_a_teacher_without_objects_says_so(robot: RobotClient, samples: list[Sequence]) -> None:
