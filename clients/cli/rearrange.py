@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import time
+import json as jsonlib
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
@@ -22,33 +22,37 @@ def rearrange(
     category: Annotated[list[str] | None, typer.Option(help="Category of the simulator; may be repeated; ten where left out.")] = None,
     views: Annotated[int, typer.Option(min=2, help="Views in each burst.")] = 8,
     seed: Annotated[int, typer.Option(help="Of objects, poses, rooms and faults.")] = 0,
+    resume: Annotated[bool, typer.Option(help="Continue the interrupted batch in --out.")] = False,
     url: ServiceUrl = None,
     json: Json = False,
 ) -> None:
     """Show a reference at a goal, bring other objects of its category there, and measure how they end."""
     from clients.robot import RobotClient
     from clients.simulator.raycast.export import draw_models
-    from clients.simulator.rearrange import Rearrangement, summarise, write_json, write_picture
+    from clients.simulator.rearrange import Rearrangement, Trial, summarise, write_json, write_picture
+    from clients.simulator.runner import interrupted
 
     categories = category or CATEGORIES
     draw_models(categories, 1, seed)  # says at once which category there is none of
     out.mkdir(parents=True, exist_ok=True)
     screen = errors if json else console
-    with service(url, out) as address, RobotClient(address) as robot:
-        started = time.perf_counter()
-        batch = Rearrangement(robot, categories, trials, views, seed)
-        done = []
-        with screen.status(f"1 of {trials}") as status:
+    settings: dict[str, object] = {"categories": categories, "trials": trials, "views": views, "seed": seed}
+    lines = out / "rearrange.jsonl"
+    done = [Trial(**jsonlib.loads(line)) for line in interrupted(lines, settings)] if resume else []
+    with service(url, out, fresh=not resume) as address, RobotClient(address) as robot, lines.open("w", encoding="utf-8") as file:
+        print(*(jsonlib.dumps(each) for each in (settings, *map(asdict, done))), sep="\n", file=file, flush=True)
+        batch = Rearrangement(robot, categories, trials, views, seed, done=len(done))
+        with screen.status(f"{len(done) + 1} of {trials}") as status:
             for trial in batch:
                 done.append(trial)
+                print(jsonlib.dumps(asdict(trial)), file=file, flush=True)
                 how = trial.failure or f"{trial.rotation_deg:.1f}° and {100 * (trial.position_m or 0):.1f} cm off"
                 screen.print(f"{trial.number:>3}  {trial.name or trial.category:<24} {how}", highlight=False)
                 status.update(f"{len(done) + 1} of {trials}")
-        summary = summarise(done, time.perf_counter() - started)
-    settings: dict[str, object] = {"categories": categories, "trials": trials, "views": views, "seed": seed}
+                if batch.pictured(trial):
+                    write_picture(batch.pictures, out / "rearrange.png")
+    summary = summarise(done)
     write_json(done, summary, settings, out / "rearrange.json")
-    if batch.pictures:
-        write_picture(batch.pictures, out / "rearrange.png")
     if json:
         print_json(asdict(summary))
         return

@@ -85,8 +85,18 @@ class Rearrangement:
     """Iterate for the trials; `pictures` grows with them."""
 
     def __init__(
-        self, robot: RobotClient, categories: Sequence[str], trials: int, views: int, seed: int, sensor: SensorConfig | None = None
+        self,
+        robot: RobotClient,
+        categories: Sequence[str],
+        trials: int,
+        views: int,
+        seed: int,
+        sensor: SensorConfig | None = None,
+        *,
+        done: int = 0,
     ) -> None:
+        """`done` trials of the same batch were carried out before: the service's memory has their goals."""
+        self._done = done
         self._robot = robot
         self._categories = list(categories)
         self._trials = trials
@@ -100,8 +110,12 @@ class Rearrangement:
         self._goal_pictures: dict[str, FloatArray] = {}
 
     def __iter__(self) -> Iterator[Trial]:
-        for number in range(1, self._trials + 1):
+        for number in range(self._done + 1, self._trials + 1):
             yield self._trial(number, self._categories[(number - 1) % len(self._categories)])
+
+    def pictured(self, trial: Trial) -> bool:
+        """Whether `pictures` has grown with a trial."""
+        return trial.number <= PICTURED and trial.rotation_deg is not None
 
     def _trial(self, number: int, category: str) -> Trial:
         started = time.perf_counter()
@@ -135,7 +149,7 @@ class Rearrangement:
                 failure = f"was taken for {self._names.get(seen.category_id or '', 'something else') if seen.category_id else seen.outcome}"
         except ServiceProblem as problem:
             failure = str(problem)
-        if after is not None and len(self.pictures) < PICTURED:
+        if after is not None and number <= PICTURED:
             self.pictures.append(np.hstack([self._goal_pictures[category], picture, self._picture(world)]))
         return Trial(
             number=number,
@@ -153,21 +167,28 @@ class Rearrangement:
         )
 
     def _show_goal(self, category: str) -> None:
-        """Learns the category from its reference, then shows the reference at the goal. Raises ServiceProblem, ScanFailed."""
+        """Learns the category from its reference, then shows the reference at the goal, unless an interrupted run did.
+
+        Raises ServiceProblem, ScanFailed.
+        """
         reference = RECIPES[category].make(category, self._seed * 1000)
         visit = 100_000 + self._categories.index(category)
-        world = self._world(visit)
-        world.show([reference])
-        arm = Arm(world, ArmConfig())
-        category_id = learn_from_scan(self._robot, arm, self._views, visit).id
+        known = next((each.id for each in self._robot.categories() if each.name == category), None)
+        if known is None:
+            world = self._world(visit)
+            world.show([reference])
+            arm = Arm(world, ArmConfig())
+            known = learn_from_scan(self._robot, arm, self._views, visit, category).id
         place = np.random.default_rng([self._seed, visit])
         goal = standing(reference, rotation_about("z", float(place.uniform(0, 360))), GOAL_M)
         world = self._world(visit)
         world.show([reference], [goal])
-        shown = self._robot.observe(Arm(world, ArmConfig()).glance(self._views, visit + 1), category_id=category_id, learn=False)
-        kept = self._robot.set_goal(category_id, shown.id, name="goal", anchor="base")
-        self._goals[category] = (kept.id, category_id, goal, reference)
-        self._names[category_id] = category
+        goals = self._robot.goals(known)
+        if not goals:
+            shown = self._robot.observe(Arm(world, ArmConfig()).glance(self._views, visit + 1), category_id=known, learn=False)
+            goals = [self._robot.set_goal(known, shown.id, name="goal", anchor="base")]
+        self._goals[category] = (goals[0].id, known, goal, reference)
+        self._names[known] = category
         self._goal_pictures[category] = self._picture(world)
 
     def _world(self, visit: int) -> RaycastWorld:
@@ -178,7 +199,7 @@ class Rearrangement:
         return np.asarray(cv2.resize(image, TILE[::-1], interpolation=cv2.INTER_AREA))
 
 
-def summarise(trials: Sequence[Trial], total_s: float) -> RearrangeSummary:
+def summarise(trials: Sequence[Trial]) -> RearrangeSummary:
     """The figures of a batch."""
     moved = [(each.rotation_deg, each.position_m) for each in trials if each.rotation_deg is not None and each.position_m is not None]
 
@@ -197,7 +218,7 @@ def summarise(trials: Sequence[Trial], total_s: float) -> RearrangeSummary:
         median_m=_median([metres for _, metres in moved]),
         start_median_deg=_median([each.start_rotation_deg for each in trials if each.start_rotation_deg is not None]),
         start_median_m=_median([each.start_position_m for each in trials if each.start_position_m is not None]),
-        total_s=total_s,
+        total_s=sum(each.seconds for each in trials),
     )
 
 

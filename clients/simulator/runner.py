@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -43,20 +43,24 @@ class Output:
 
     def earlier(self, script: Script) -> list[Encounter]:
         """The encounters of an interrupted run. Raises ClientError where there was none, or it was of another script."""
-        return [Encounter.from_json(line) for line in self._resumed(self.lines, script)]
+        return [Encounter.from_json(line) for line in interrupted(self.lines, script.as_settings())]
 
     def earlier_lessons(self, script: Script) -> list[Lesson]:
         """The same of a teacher's lessons."""
-        return [Lesson(**json.loads(line)) for line in self._resumed(self.lessons, script)]
+        return [Lesson(**json.loads(line)) for line in interrupted(self.lessons, script.as_settings())]
 
-    def _resumed(self, file: Path, script: Script) -> list[str]:
-        """The whole lines of an interrupted run's file but the first, which has its settings."""
-        if not file.is_file():
-            raise ClientError(f"there is no run to resume in {self.folder}; leave out --resume")
-        settings, *rest = file.read_text(encoding="utf-8").splitlines()
-        if json.loads(settings) != json.loads(json.dumps(script.as_settings())):
-            raise ClientError(f"the run in {self.folder} was of {settings}; resume it with the same settings, or name another --out")
-        return [line for line in rest if line.endswith("}")]
+
+def interrupted(file: Path, settings: Mapping[str, object]) -> list[str]:
+    """The whole lines that an interrupted run left in a file, but the first, which has its settings.
+
+    Raises ClientError where there was none, or it was of other settings.
+    """
+    if not file.is_file():
+        raise ClientError(f"there is no run to resume in {file.parent}; leave out --resume")
+    kept, *rest = file.read_text(encoding="utf-8").splitlines()
+    if json.loads(kept) != json.loads(json.dumps(settings)):
+        raise ClientError(f"the run in {file.parent} was of {kept}; resume it with the same settings, or name another --out")
+    return [line for line in rest if line.endswith("}")]
 
 
 def run_episode(script: Script, url: str, output: Output, console: Console, *, resume: bool = False) -> Summary:

@@ -79,9 +79,9 @@ def _replace_unreachable(arm: Arm, scan: Scan, center_m: FloatArray, report: Sca
             return
 
 
-def learn_from_scan(robot: RobotClient, arm: Arm, views: int, seed: int) -> Category:
+def learn_from_scan(robot: RobotClient, arm: Arm, views: int, seed: int, name: str | None = None) -> Category:
     """A glance, a scan of what is there, and the category that it makes, whatever would be decided. Raises ServiceProblem, ScanFailed."""
-    return carry_out(arm, robot.scan(arm.glance(views, seed)))
+    return carry_out(arm, robot.scan(arm.glance(views, seed)), name)
 
 
 COULD_NOT = (ServiceProblem, ScanFailed)

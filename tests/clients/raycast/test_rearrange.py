@@ -29,6 +29,8 @@ class Oracle:
         self._off[0, 3] = shift_m
         self._goal: Sim3 | None = None
         self.refuse = False
+        self.known: list[Any] = []
+        self.kept: list[Any] = []
 
     def scan(self, burst: Any) -> Any:
         return FakeScan(SimpleNamespace(center_m=np.zeros(3)))
@@ -40,11 +42,18 @@ class Oracle:
 
     refuse_goals = False
 
+    def categories(self) -> list[Any]:
+        return self.known
+
+    def goals(self, category_id: str) -> list[Any]:
+        return self.kept
+
     def set_goal(self, category_id: str, source: str, **options: Any) -> Any:
         if self.refuse_goals:
             raise NoPoseProblem("the reference has no pose", status=422)
         self._goal = self._worlds[-1].objects[0].world_from_model
-        return SimpleNamespace(id="g")
+        self.kept = [SimpleNamespace(id="g")]
+        return self.kept[0]
 
     def plan(self, goal_id: str, source: str, **options: Any) -> Any:
         now = self._worlds[-1].objects[0].world_from_model
@@ -105,7 +114,7 @@ def test_a_refused_plan_moves_nothing_and_counts_as_wrong(worlds: list[RaycastWo
     (trial,) = batch(robot, small)
     assert trial.rotation_deg is None
     assert trial.failure == "no transform explains the views"
-    summary = summarise([trial], 1.0)
+    summary = summarise([trial])
     assert (summary.trials, summary.moved, summary.acc30, summary.success, summary.median_deg) == (1, 0, 0.0, 0.0, None)
 
 
@@ -114,5 +123,17 @@ def test_a_goal_that_cannot_be_shown_costs_its_trials_and_no_others(worlds: list
     robot.refuse_goals = True
     trials = list(batch(robot, small, trials=2))
     assert [each.failure for each in trials] == ["no goal: the reference has no pose"] * 2
-    summary = summarise(trials, 1.0)
+    summary = summarise(trials)
     assert (summary.trials, summary.moved, summary.start_median_deg) == (2, 0, None)
+
+
+def test_an_interrupted_batch_goes_on_with_the_goals_that_it_set(worlds: list[RaycastWorld], small: SensorConfig) -> None:
+    robot = Oracle(worlds, turn_deg=10.0)
+    robot.known, robot.kept = [SimpleNamespace(id="c", name="mug")], [SimpleNamespace(id="g")]
+    robot.refuse_goals = True  # it must not be shown again
+    client: RobotClient = robot  # type: ignore[assignment]
+    rest = Rearrangement(client, ["mug"], 2, views=2, seed=0, sensor=small, done=1)
+    robot.plan = lambda *ids, **options: SimpleNamespace(goal_from_current=np.eye(4), distance_m=0.0, angle_deg=0.0)  # type: ignore[method-assign]
+    (trial,) = rest
+    assert trial.number == 2
+    assert (trial.rotation_deg, trial.position_m) == (trial.start_rotation_deg, trial.start_position_m)
