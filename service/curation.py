@@ -36,6 +36,23 @@ class Similarities:
     """By which all of this is told."""
 
 
+@dataclass(frozen=True, eq=False)
+class MergePreview:
+    """What a merge would do."""
+
+    gone: Category
+    stays: Category
+    goals: int
+    """Of the one that goes: nobody can ask for them any more."""
+    similarity: float | None
+    """Between the most alike of their bursts."""
+    within: float | None
+    """The same within the one that stays; None where it has one burst."""
+    nearest: bool
+    """Whether no other category is as like the one that goes."""
+    score: str
+
+
 class Curation:
     """Changes of one memory's categories."""
 
@@ -63,6 +80,18 @@ class Curation:
         category = self._memory.categories.merge(category_id, into_id, actor=actor)
         self._events.publish("category_merged", id=category_id, into=into_id)
         return category
+
+    def preview_merge(self, category_id: str, into_id: str) -> MergePreview:
+        """What `merge` would do; changes nothing. Raises as it does, and Unavailable where tokens are damaged."""
+        if category_id == into_id:
+            raise InvalidInput("into", "is the category itself; name another one")
+        gone, stays = (self._memory.categories.get(each) for each in (category_id, into_id))
+        between, inside = self.similarities(category_id), self.similarities(into_id)
+        own = np.eye(len(inside.matrix), dtype=bool)
+        within = float(inside.matrix[~own].max()) if len(own) > 1 else None
+        similarity = dict(between.categories).get(into_id)
+        goals = len(self._memory.goals.of(category_id))
+        return MergePreview(gone, stays, goals, similarity, within, between.categories[0][0] == into_id, between.score)
 
     def split(self, category_id: str, instance_ids: Sequence[str], name: str | None, *, actor: str | None = None) -> Category:
         """Bursts leave their category for a new one, whose reference is made of the first of them that allows it.

@@ -26,6 +26,12 @@ class Audit:
         """The latest changes, newest first."""
         return [self._entry(row) for row in self._connection.rows("SELECT * FROM audit ORDER BY rowid DESC LIMIT ?", limit)]
 
+    def of(self, category_id: str, limit: int) -> list[AuditEntry]:
+        """The latest changes of a category, newest first, also those that it gave bursts to or took them from."""
+        mine = "category_id = ?1 OR json_extract(after, '$.into') = ?1 OR json_extract(after, '$.category') = ?1"
+        query = f"SELECT * FROM audit WHERE {mine} ORDER BY rowid DESC LIMIT ?2"
+        return [self._entry(row) for row in self._connection.rows(query, category_id, limit)]
+
     def get(self, entry_id: str) -> AuditEntry:
         """Raises NotFound."""
         row = only(self._connection.rows("SELECT * FROM audit WHERE id = ?", entry_id))

@@ -16,11 +16,12 @@ from core.reference import Reference
 from core.views import Burst, View
 from store.arrays import arrays_file, read_arrays, write_arrays
 from store.audit import record
-from store.bursts import read_view, write_burst
+from store.bursts import read_burst, read_view, write_burst
 from store.columns import files_from_json, files_to_json
 from store.connection import Connection, Row, new_id, only
 from store.folders import Files
 from store.instances import Instances, insert_instance
+from store.overview import Listing, Order, Summary, listing
 from store.records import Category
 from store.retention import now
 from store.scans import OPEN
@@ -71,6 +72,10 @@ class Categories:
     def all(self) -> list[Category]:
         """All of them, oldest first."""
         return [_category(row) for row in self._connection.rows(f"{SELECT} ORDER BY c.rowid")]
+
+    def listing(self, limit: int, offset: int = 0, *, order: Order = "name", called: str | None = None) -> Listing:
+        """A page of those whose name has `called` in it, or whose id begins so, with what was seen of each."""
+        return listing(self._connection, limit, offset, order=order, called=called)
 
     def get(self, category_id: str) -> Category:
         """Raises NotFound."""
@@ -143,6 +148,15 @@ class Categories:
         rows = self._connection.rows("SELECT files FROM categories WHERE id = ?", self.get(category_id).id)
         name, file = arrays_file(files_from_json(rows[0]["files"]))
         return Reference.from_arrays(read_arrays(self.folder(category_id) / name, file.sha256))
+
+    def summary(self, category_id: str) -> Summary:
+        """One as `listing` has it. Raises NotFound."""
+        (found,) = listing(self._connection, 1, 0, called=self.get(category_id).id).categories
+        return found
+
+    def burst(self, category_id: str) -> Burst:
+        """All reference views. Raises NotFound."""
+        return read_burst(self.folder(self.get(category_id).id))
 
     def view(self, category_id: str, index: int) -> View:
         """One reference view. Raises NotFound."""

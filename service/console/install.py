@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from fastapi import FastAPI
 
-from service.console import now, observations, sign_in
+from service.console import categories, change, now, observations, sign_in
 from service.console.assets import PREFIX, Assets
 
 
 def install(app: FastAPI) -> None:
     """Its pages, and the files they need."""
-    for page in (now, observations, sign_in):
+    for page in (now, categories, change, observations, sign_in):
         app.include_router(page.router)
     app.mount(PREFIX, Assets(), name="static")

@@ -38,10 +38,10 @@ class Link:
     title: str
 
 
-NAVIGATION = (Link("/", "Now"), Link("/observations", "Observations"))
+NAVIGATION = (Link("/", "Now"), Link("/categories", "Categories"), Link("/observations", "Observations"))
 
 
-def query(**parameters: str | None) -> str:
+def query(**parameters: str | int | None) -> str:
     """The end of an address, with those that are given."""
     given = {name: value for name, value in parameters.items() if value is not None}
     return f"?{urlencode(given)}" if given else ""

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
+
+from store.records import Action, AuditEntry
 
 SHORT = 8
 """Characters of an id that people compare."""
@@ -48,6 +50,54 @@ def decimal(value: float | None, digits: int = 2) -> str:
     return "–" if value is None else f"{round(value, digits) + 0.0:.{digits}f}"  # never -0.00
 
 
+def quantity(count: int, what: str, plural: str | None = None) -> str:
+    """1 burst, 3 bursts."""
+    return f"{count} {what if count == 1 else plural or what + 's'}"
+
+
+def megabytes(size: int) -> str:
+    """12.3 MB, 1.20 GB."""
+    return f"{size / 1e6:.1f} MB" if size < 1e9 else f"{size / 1e9:.2f} GB"
+
+
+def change_words(entry: AuditEntry, names: Mapping[str, str | None]) -> str:
+    """What a change was, in a sentence."""
+    before, after = entry.before, entry.after
+
+    def name(category_id: str | None) -> str:
+        if category_id is None or category_id not in names:
+            return "a category that is gone"
+        return f"“{called(names[category_id], category_id)}”"
+
+    def quoted(said: str | None) -> str:
+        return f"“{called(said, entry.category_id)}”"
+
+    this = name(entry.category_id)
+    learnt = quoted(after["name"]) if after.get("name") else this
+    words: dict[Action, Callable[[], str]] = {
+        "create": lambda: f"Learnt {learnt} from {quantity(after['views'], 'view')}",
+        "rename": lambda: f"Renamed {quoted(before['name'])} to {quoted(after['name'])}",
+        "merge": lambda: f"Merged {quoted(before['name'])} into {name(after['into'])}, {quantity(len(before['instances']), 'burst')}",
+        "split": lambda: f"Split {quantity(len(before['instances']), 'burst')} off {this} as {name(after['category'])}",
+        "delete": lambda: f"Deleted {quoted(before['name'])} with {quantity(before['instances'], 'burst')}",
+        "forget": lambda: f"Took a burst out of {this}",
+        "import": lambda: f"Imported {quantity(len(after['categories']), 'category', 'categories')}",
+        "correct": lambda: "Corrected an observation",
+        "reembed": lambda: "Computed the memory anew",
+        "undo": lambda: f"Took back: {before['action']}" + (f" of {this}" if entry.category_id in names else ""),
+        "calibrate": lambda: _rate_words(after["false_known_rate"]),
+        "backup": lambda: "Backed up the memory",
+        "export": lambda: f"Exported {quantity(after['categories'], 'category', 'categories')}",
+        "key": lambda: f"Made a key for {after['name']}, {after['role']}",
+        "revoke": lambda: f"Revoked the key of {before['name']}",
+    }
+    return words[entry.action]()
+
+
+def _rate_words(rate: float | None) -> str:
+    return "Set the false-known rate to the setting's" if rate is None else f"Set the false-known rate to {100 * rate:g} %"
+
+
 FILTERS: dict[str, Callable[..., Any]] = {
     "milliseconds": milliseconds,
     "metres": metres,
@@ -56,5 +106,8 @@ FILTERS: dict[str, Callable[..., Any]] = {
     "clock": clock,
     "called": called,
     "decimal": decimal,
+    "quantity": quantity,
+    "megabytes": megabytes,
+    "change": change_words,
 }
 """By their names in templates."""

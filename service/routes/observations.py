@@ -55,9 +55,7 @@ def get_observation(observation_id: str, query: Annotated[AnswerQuery, Query()],
 
 
 @router.post("/{observation_id}/correct", responses=problems(404, 409, 422, 503))
-async def correct_observation(
-    observation_id: str, correction: Correction, agent: AgentDep, work: WorkDep, actor: ActorDep = None
-) -> Observation:
+async def correct_observation(observation_id: str, correction: Correction, agent: AgentDep, work: WorkDep, actor: ActorDep) -> Observation:
     """Says what it was really of: its burst joins that category and leaves the one it had joined; null makes a new one of its views."""
     said = correction.category_id, correction.name
     return await work.run(lambda: _observation(agent, agent.curation.correct(observation_id, *said, actor=actor)))

@@ -1,0 +1,96 @@
+"""/categories: what is known, and one category with everything that its recognition rests on."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import numpy as np
+from fastapi import APIRouter, Query, Request
+from fastapi.responses import HTMLResponse, JSONResponse
+
+from service.agent import Agent
+from service.console.change import done
+from service.console.facts import health, symmetry_words, variance_bars
+from service.console.pages import Page, render
+from service.console.scenes import reference_scene
+from service.deps import AgentDep
+from store.overview import Order
+
+router = APIRouter(prefix="/categories", route_class=Page, include_in_schema=False)
+PAGE = 48
+"""Categories a page."""
+NEAREST = 6
+"""Other categories that one may be taken for."""
+HISTORY = 12
+"""Changes shown of one category."""
+
+
+@router.get("")
+def categories(
+    request: Request,
+    agent: AgentDep,
+    page: Annotated[int, Query(ge=1, le=10_000)] = 1,
+    order: Annotated[Order, Query()] = "name",
+    called: Annotated[str, Query(max_length=200)] = "",
+    change: Annotated[str | None, Query()] = None,
+) -> HTMLResponse:
+    """All of them, a page at a time."""
+    found = agent.memory.categories.listing(PAGE, (page - 1) * PAGE, order=order, called=called.strip() or None)
+    shown = [(each, health(each)) for each in found.categories]
+    template = "category_grid.html" if request.headers.get("hx-target") == "grid" else "categories.html"
+    pages = -(-found.total // PAGE)
+    return render(
+        request,
+        template,
+        shown=shown,
+        total=found.total,
+        page=page,
+        pages=pages,
+        order=order,
+        called=called,
+        done=done(agent, change),
+    )
+
+
+@router.get("/{category_id}")
+def category(request: Request, category_id: str, agent: AgentDep, change: Annotated[str | None, Query()] = None) -> HTMLResponse:
+    """One of them."""
+    found = agent.memory.categories.get(category_id)
+    summary = agent.memory.categories.summary(category_id)
+    reference = agent.memory.categories.reference(category_id)
+    return render(
+        request,
+        "category.html",
+        category=found,
+        summary=summary,
+        health=health(summary),
+        reference=reference,
+        symmetries=symmetry_words(reference),
+        variance=variance_bars(reference.basis.explained),
+        instances=agent.memory.instances.of(category_id),
+        goals=agent.memory.goals.of(category_id),
+        entries=agent.memory.audit.of(category_id, HISTORY),
+        names=agent.names(),
+        done=done(agent, change),
+    )
+
+
+@router.get("/{category_id}/scene")
+def category_scene(category_id: str, agent: AgentDep) -> JSONResponse:
+    """What the 3-D view shows of it."""
+    categories = agent.memory.categories
+    return JSONResponse(reference_scene(categories.reference(category_id), categories.burst(category_id)))
+
+
+@router.get("/{category_id}/nearest")
+def category_nearest(request: Request, category_id: str, agent: AgentDep) -> HTMLResponse:
+    """What it is most likely to be taken for, and how alike its own bursts are: a part of its page, since it compares with everything."""
+    return render(request, "category_nearest.html", category_id=category_id, **_nearest(agent, category_id))
+
+
+def _nearest(agent: Agent, category_id: str) -> dict[str, Any]:
+    similarities = agent.curation.similarities(category_id)
+    within = similarities.matrix[~np.eye(len(similarities.matrix), dtype=bool)]
+    least, most = (float(within.min()), float(within.max())) if len(within) else (None, None)
+    nearest = similarities.categories[:NEAREST]
+    return {"similarities": similarities, "nearest": nearest, "least_within": least, "most_within": most, "names": agent.names()}
