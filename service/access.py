@@ -73,6 +73,7 @@ ACCESS: Mapping[str, Role | None] = {
     "console_observation": VIEWER,
     "console_categories": VIEWER,
     "console_category": VIEWER,
+    "console_category_cover": VIEWER,
     "console_category_scene": VIEWER,
     "console_category_nearest": VIEWER,
     "console_rename": ADMIN,

@@ -57,8 +57,8 @@ def listing(connection: Connection, limit: int, offset: int, *, order: Order = "
     """Those whose name or id has `called` in it, in this order."""
     where, parameters = "", []
     if called:
-        where = " AND (instr(lower(coalesce(c.name, '')), lower(?)) OR c.id LIKE ? || '%')"
-        parameters = [called, called.replace("%", "").replace("_", "")]
+        where = " AND (instr(lower(coalesce(c.name, '')), lower(?)) OR instr(c.id, ?) = 1)"
+        parameters = [called, called]
     rows = connection.rows(f"{QUERY}{where} ORDER BY {ORDERS[order]} LIMIT ? OFFSET ?", *parameters, limit, offset)
     (total,) = connection.rows(f"SELECT count(*) AS n FROM categories c WHERE c.removed_by IS NULL{where}", *parameters)
     return Listing(tuple(Summary(**row) for row in rows), total["n"])

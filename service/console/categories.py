@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Any
 
 import numpy as np
-from fastapi import APIRouter, Query, Request
+from fastapi import APIRouter, Query, Request, Response
 from fastapi.responses import HTMLResponse, JSONResponse
 
 from service.agent import Agent
@@ -14,6 +14,9 @@ from service.console.facts import health, symmetry_words, variance_bars
 from service.console.pages import Page, render
 from service.console.scenes import reference_scene
 from service.deps import AgentDep
+from service.exchange import MemoryRoute
+from service.gallery import CategoryGallery
+from service.routes.png import Side, png
 from store.overview import Order
 
 router = APIRouter(prefix="/categories", route_class=Page, include_in_schema=False)
@@ -50,6 +53,23 @@ def categories(
         called=called,
         done=done(agent, change),
     )
+
+
+class PictureRoute(MemoryRoute):
+    """A picture that pages show: kept by browsers as those of the service are."""
+
+    kind = Page.kind
+
+
+pictures = APIRouter(prefix="/categories", route_class=PictureRoute, include_in_schema=False)
+
+
+@pictures.get("/{category_id}/cover.png")
+def category_cover(category_id: str, agent: AgentDep, side: Side = None) -> Response:
+    """The reference view whose object has a usual size in it: neither all background nor hardly seen."""
+    sizes = [len(view.cells) for view in agent.memory.categories.reference(category_id).views]
+    usual = int(np.abs(np.array(sizes) - np.median(sizes)).argmin())
+    return png(CategoryGallery(agent, category_id).foreground(usual), side)
 
 
 @router.get("/{category_id}")

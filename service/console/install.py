@@ -12,4 +12,5 @@ def install(app: FastAPI) -> None:
     """Its pages, and the files they need."""
     for page in (now, categories, change, observations, sign_in):
         app.include_router(page.router)
+    app.include_router(categories.pictures)
     app.mount(PREFIX, Assets(), name="static")

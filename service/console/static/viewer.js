@@ -10,7 +10,7 @@ import { OrbitControls } from "./vendor/OrbitControls.js";
 
 const EDGES = [0, 1, 2, 3, 4, 5, 6, 7].flatMap((a) => [0, 1, 2].filter((axis) => !(a & (1 << axis))).map((axis) => [a, a | (1 << axis)]));
 const FIELD_OF_VIEW_DEG = 35;
-const MARGIN = 1.15;
+const MARGIN = 0.92; // a bounding sphere is larger than what is in it
 const FRUSTUM_DEPTH = 0.22; // of the distance from the camera to what it looks at
 const TURN = Math.PI / 18;
 const ZOOM = 1.15;
@@ -49,7 +49,7 @@ function pointsOf(cloud, radius, map) {
     geometry.setAttribute("color", new THREE.BufferAttribute(linear, 3));
   }
   const count = cloud.points.length / 3;
-  const size = Math.min(0.05, 2.2 / Math.sqrt(count || 1)) * radius;
+  const size = Math.min(0.06, 3.6 / Math.sqrt(count || 1)) * radius;
   const material = new THREE.PointsMaterial({ size, map, alphaTest: 0.5, vertexColors: Boolean(cloud.colours) });
   const points = new THREE.Points(geometry, material);
   points.userData.choice = cloud.choice;

@@ -27,8 +27,8 @@ def test_what_was_learnt_is_told(client, learn):
     category = learn("bright", "ball")
     client.patch(f"/v1/categories/{category['id']}", json={"name": "egg"})
     text = client.get("/now/side").text
-    assert "learnt" in text
-    assert re.search(r"named\s+<b>egg</b>,\s+before ball", text)
+    assert "Learnt “ball” from 6 views" in text
+    assert "Renamed “ball” to “egg”" in text
 
 
 def test_events_are_heard_from_where_the_page_ends(client, look, parts):

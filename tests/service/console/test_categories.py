@@ -1,0 +1,264 @@
+"""The pages of categories: what they show, what a form changes and takes back, and what a page costs where there are many."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from core.boxes import OrientedBox
+from service.console.facts import health, symmetry_words, variance_bars
+from store.connection import Connection
+from store.overview import Summary
+
+MANY = 500
+OBSERVATIONS = 10_000
+
+
+@pytest.fixture
+def bright(client, learn):
+    """A category."""
+    return learn("bright", "cup")["id"]
+
+
+@pytest.fixture
+def dark(client, learn):
+    """Another one."""
+    return learn("dark", "mug")["id"]
+
+
+@pytest.fixture
+def seen(client, bright, look, parts):
+    """The category with a second burst."""
+    client.post("/v1/observations", files=parts(look()), params={"category_id": bright})
+    return bright
+
+
+def test_the_grid_shows_every_category(client, bright, dark):
+    text = client.get("/categories").text
+    assert "2 categories" in text
+    for category_id, name in ((bright, "cup"), (dark, "mug")):
+        assert f'href="/categories/{category_id}">{name}<' in text
+        assert f"/categories/{category_id}/cover.png" in text
+
+
+def test_an_empty_memory_says_how_categories_come(client):
+    assert "Nothing was learnt yet" in client.get("/categories").text
+
+
+def test_names_are_searched(client, bright, dark):
+    assert "cup" not in client.get("/categories", params={"called": "MU"}).text
+    assert "mug" in client.get("/categories", params={"called": "MU"}).text
+    assert "mug" in client.get("/categories", params={"called": dark[:6]}).text
+    assert "No category is called so" in client.get("/categories", params={"called": "%"}).text
+
+
+def test_a_search_gets_the_grid_alone(client, bright):
+    answer = client.get("/categories", headers={"HX-Request": "true", "HX-Target": "grid"})
+    assert "<html" not in answer.text
+    assert "1 category" in answer.text
+
+
+def test_a_cover_is_kept_by_browsers(client, bright):
+    first = client.get(f"/categories/{bright}/cover.png?side=120")
+    assert first.headers["content-type"] == "image/png"
+    assert client.get(f"/categories/{bright}/cover.png?side=120", headers={"If-None-Match": first.headers["etag"]}).status_code == 304
+
+
+def test_a_category_shows_what_it_was_learnt_from(client, seen):
+    text = client.get(f"/categories/{seen}").text
+    for kind in ("rgb", "foreground", "pca", "overlay"):
+        assert len(set(re.findall(rf"/views/\d/{kind}.png", text))) == 6
+    assert f'data-scene="/categories/{seen}/scene"' in text
+    assert "1 observation<" in text
+    assert "the request naming it" in text
+    assert len(re.findall('type="checkbox"', text)) == 2
+
+
+def test_a_category_that_is_not_there_is_a_page_that_says_so(client):
+    answer = client.get("/categories/none")
+    assert answer.status_code == 404
+    assert answer.headers["content-type"].startswith("text/html")
+
+
+def test_the_scene_is_the_reference(client, bright):
+    scene = client.get(f"/categories/{bright}/scene").json()
+    assert [cloud["choice"] for cloud in scene["clouds"]] == ["Image", "Components"]
+    assert len(scene["cameras"]) == 6
+    (box,) = scene["boxes"]
+    for cloud in scene["clouds"]:
+        assert len(cloud["points"]) == len(cloud["colours"]) > 300
+        for axis in range(3):
+            edges = [corner[axis] for corner in box["corners"]]
+            reach = max(edges) - min(edges)
+            assert min(edges) - 0.1 * reach <= min(cloud["points"][axis::3]) <= max(cloud["points"][axis::3]) <= max(edges) + 0.1 * reach
+    assert scene["up"][2] == pytest.approx(1, abs=0.05)
+
+
+def test_what_it_is_confused_with_comes_most_alike_first(client, seen, dark):
+    text = client.get(f"/categories/{seen}/nearest").text
+    assert "mug" in text
+    assert f"/categories/{seen}/merge?into={dark}" in text
+    assert "Its own bursts reach" in text
+
+
+def follow(client, address, **fields):
+    """Sends a form; the page it leads to."""
+    answer = client.post(address, data=fields)
+    assert answer.status_code == 200, answer.text
+    return answer
+
+
+def undo_of(page):
+    """Where the note on a page takes its change back."""
+    return re.search(r'<div class="note good done".*?action="([^"]+)"', page.text, re.DOTALL)[1]
+
+
+def test_a_rename_and_the_way_back(client, bright):
+    page = follow(client, f"/categories/{bright}/rename", name="  tea cup ")
+    assert "Renamed “cup” to “tea cup”" in page.text
+    assert client.get(f"/v1/categories/{bright}").json()["name"] == "tea cup"
+    assert "Took back: rename" in follow(client, undo_of(page)).text
+    assert client.get(f"/v1/categories/{bright}").json()["name"] == "cup"
+
+
+def test_a_merge_tells_what_it_changes_changes_it_and_can_be_taken_back(client, seen, dark):
+    assert "mug" in client.get(f"/categories/{seen}/merge").text
+    preview = client.get(f"/categories/{seen}/merge", params={"into": dark}).text
+    assert re.search(r"1 \+ 2 = <b>3</b>", preview)
+    assert client.get("/v1/info").json()["categories"] == 2
+    page = follow(client, f"/categories/{seen}/merge", into=dark)
+    assert page.url.path == f"/categories/{dark}"
+    assert "Merged “cup” into “mug”, 2 bursts" in page.text
+    assert client.get(f"/v1/categories/{dark}").json()["instances"] == 3
+    follow(client, undo_of(page))
+    assert client.get(f"/v1/categories/{seen}").json()["instances"] == 2
+
+
+def test_chosen_bursts_are_split_off(client, seen):
+    instances = client.get(f"/v1/categories/{seen}/instances").json()["instances"]
+    page = follow(client, f"/categories/{seen}/split", instance=[instances[1]["id"]], name="bowl")
+    assert page.url.path != f"/categories/{seen}"
+    assert "Split 1 burst off “cup” as “bowl”" in page.text
+    follow(client, undo_of(page))
+    assert client.get(f"/v1/categories/{seen}").json()["instances"] == 2
+
+
+def test_nothing_chosen_is_told(client, seen):
+    answer = client.post(f"/categories/{seen}/split", data={"name": "bowl"})
+    assert answer.status_code == 422
+    assert answer.headers["content-type"].startswith("text/html")
+
+
+def test_a_burst_is_forgotten_and_brought_back(client, seen):
+    instances = client.get(f"/v1/categories/{seen}/instances").json()["instances"]
+    page = follow(client, f"/categories/{seen}/forget", instance=instances[1]["id"])
+    assert client.get(f"/v1/categories/{seen}").json()["instances"] == 1
+    follow(client, undo_of(page))
+    assert client.get(f"/v1/categories/{seen}").json()["instances"] == 2
+
+
+def test_a_deletion_asks_first_and_can_be_taken_back(client, seen):
+    assert "2 bursts" in client.get(f"/categories/{seen}/delete").text
+    page = follow(client, f"/categories/{seen}/delete")
+    assert page.url.path == "/categories"
+    assert "Deleted “cup” with 2 bursts" in page.text
+    assert client.get("/v1/info").json()["categories"] == 0
+    assert follow(client, undo_of(page)).url.path == f"/categories/{seen}"
+
+
+def test_a_change_that_is_undone_already_is_told(client, bright):
+    address = undo_of(follow(client, f"/categories/{bright}/rename", name="bowl"))
+    follow(client, address)
+    again = client.post(address)
+    assert again.status_code == 409
+    assert "undone already" in again.text
+
+
+def test_a_made_up_change_is_not_told(client, bright):
+    assert "note good done" not in client.get("/categories", params={"change": "none"}).text
+
+
+def test_names_are_text_and_never_markup(client, learn):
+    name = "<img src=x onerror=alert(1)>\"'"
+    first, second = learn("bright", name)["id"], learn("dark", name)["id"]
+    client.patch(f"/v1/categories/{first}", json={"name": name + "<b>"}, headers={"X-Actor": "<script>"})
+    for path in ("", f"/{first}", f"/{first}/nearest", f"/{first}/merge", f"/{first}/merge?into={second}", f"/{first}/delete"):
+        text = client.get(f"/categories{path}").text
+        assert "<img src=x" not in text
+        assert "<script>" not in text
+        assert "&lt;img src=x onerror=alert(1)&gt;" in text
+
+
+def summary(**changes):
+    """Of a category that does well."""
+    good = {"views": 10, "instances": 5, "recognised": 4, "without_pose": 0}
+    return Summary(id="0", name=None, created_at="", last_seen="", **(good | changes))
+
+
+@pytest.mark.parametrize(
+    ("changes", "word"),
+    [({}, "good"), ({"without_pose": 2}, "poses fail"), ({"views": 3}, "few views"), ({"instances": 1, "recognised": 0}, "seen once")],
+)
+def test_health_says_what_to_mend(changes, word):
+    assert health(summary(**changes)).word == word
+
+
+def test_symmetries_are_worded_by_their_axis():
+    class Shown:
+        box = OrientedBox(np.eye(4), np.ones(3))
+        symmetries = np.concatenate(
+            [
+                Rotation.from_rotvec([[0, 0, 2 * np.pi * k / 12] for k in range(1, 12)]).as_matrix(),
+                Rotation.from_rotvec([[np.pi, 0, 0]]).as_matrix(),
+            ]
+        )
+
+    assert symmetry_words(Shown()) == ["any turn about its z axis", "a half turn about its x axis"]
+    Shown.symmetries = Shown.symmetries[:0]
+    assert symmetry_words(Shown()) == []
+
+
+def test_bars_are_as_long_as_their_share_of_the_longest():
+    bars = variance_bars([0.5, 0.25, 0.125])
+    assert [bar.length for bar in bars] == [1, 0.5, 0.25]
+    assert bars[-1].cumulative == 0.875
+    assert variance_bars([]) == []
+
+
+@pytest.fixture
+def crowded(client, seen):
+    """The service once it knows 500 categories and 10,000 observations: copies of the rows of one."""
+    with client.app.state.agent.memory._connection.change() as db:
+        for table, count in (("categories", MANY - 1), ("observations", OBSERVATIONS), ("instances", 2 * MANY)):
+            own = "name" if table == "categories" else "category_id"
+            copied = [column.name for column in db.table(table).columns if column.name not in {"id", own}]
+            value = "'category ' || n" if own == "name" else f"CASE n % {MANY} WHEN 0 THEN '{seen}' ELSE 'c' || (n % {MANY}) END"
+            (row_id,) = db.execute(f"SELECT id FROM {table} ORDER BY rowid DESC LIMIT 1").fetchone()
+            numbers = f"WITH RECURSIVE counted(n) AS (SELECT 1 UNION ALL SELECT n + 1 FROM counted WHERE n < {count})"
+            select = f"SELECT '{table[0]}' || n, {value}, {', '.join(copied)} FROM {table}, counted WHERE id = '{row_id}'"
+            db.execute(f"{numbers} INSERT INTO {table} (id, {own}, {', '.join(copied)}) {select}")
+    return client
+
+
+def test_a_crowded_memory_is_asked_little(crowded, monkeypatch):
+    """A page takes as many queries with 500 categories as with one, none of them looks at every observation, and no file is read."""
+    asked = []
+    rows = Connection.rows
+
+    def counted(connection, sql, *parameters):
+        asked.append((sql, parameters))
+        return rows(connection, sql, *parameters)
+
+    monkeypatch.setattr(Connection, "rows", counted)
+    for path in ("", "?order=seen&page=7", "?order=instances", "?called=category 49"):
+        asked.clear()
+        answer = crowded.get(f"/categories{path}")
+        assert answer.status_code == 200
+        assert len(asked) <= 3
+        for sql, parameters in list(asked):
+            plan = rows(crowded.app.state.agent.memory._connection, f"EXPLAIN QUERY PLAN {sql}", *parameters)
+            assert not [step["detail"] for step in plan if re.match("SCAN (o|observations|i|instances)\\b", step["detail"])]
+    assert f"{MANY} categories, page 1 of 11" in crowded.get("/categories").text
