@@ -10,7 +10,7 @@ from pathlib import Path
 
 from core.calibration import Calibration, Prior
 from core.errors import Conflict
-from core.novelty import BEST
+from core.novelty import BEST, LEARN_FACTOR, UNCERTAIN_FACTOR, Decision
 from service.events import Events
 from service.judgement import CALIBRATED_BY
 from store.backup import Backup
@@ -33,6 +33,20 @@ class Thresholds:
     """The same where poses were tried."""
     decisions: int
     """Own decisions that they are made of, beside the shipped ones."""
+
+
+@dataclass(frozen=True)
+class Distribution:
+    """The evidence of latest decisions, and what is made of it."""
+
+    calibration: Calibration
+    known_above: float
+    uncertain_above: float
+    learn_above: float
+    rivals: tuple[float, ...]
+    """Of own decisions, the evidence of the best wrong category."""
+    decisions: tuple[Decision, ...]
+    """Newest first."""
 
 
 class Upkeep:
@@ -65,15 +79,18 @@ class Upkeep:
 
     def thresholds(self) -> Thresholds:
         """As they are now."""
-        past = self._memory.observations.decisions(CALIBRATED_BY)
-        rate, prior = self.false_known_rate, Prior.shipped()
-        tokens, verified = ([each.rival for each in past if each.rival is not None and each.verified is kind] for kind in (False, True))
-        return Thresholds(
-            rate,
-            Calibration.fit(tokens, prior.tokens).threshold(rate),
-            Calibration.fit(verified, prior.verified).threshold(rate),
-            len(tokens) + len(verified),
+        tokens, verified = (self.distribution(kind) for kind in (False, True))
+        return Thresholds(self.false_known_rate, tokens.known_above, verified.known_above, len(tokens.rivals) + len(verified.rivals))
+
+    def distribution(self, verified: bool) -> Distribution:
+        """What a threshold of the score `best` rests on: with poses, or from tokens alone."""
+        past = [each for each in self._memory.observations.decisions(CALIBRATED_BY) if each.score == BEST and each.verified is verified]
+        rivals = tuple(each.rival for each in past if each.rival is not None)
+        calibration = Calibration.fit(rivals, Prior.shipped().of(verified))
+        known, uncertain, learn = (
+            calibration.threshold(min(factor * self.false_known_rate, 0.5)) for factor in (1.0, UNCERTAIN_FACTOR, LEARN_FACTOR)
         )
+        return Distribution(calibration, known, uncertain, learn, rivals, tuple(past))
 
     def backup(self, parent: Path, *, actor: str | None = None) -> Backup:
         """Copies the memory, while it is used, to a new folder in `parent`, called by time and version. Raises Conflict and Unavailable."""

@@ -22,9 +22,12 @@ class Audit:
     def __init__(self, connection: Connection) -> None:
         self._connection = connection
 
-    def latest(self, limit: int) -> list[AuditEntry]:
-        """The latest changes, newest first."""
-        return [self._entry(row) for row in self._connection.rows("SELECT * FROM audit ORDER BY rowid DESC LIMIT ?", limit)]
+    def latest(self, limit: int, *, before: str | None = None) -> list[AuditEntry]:
+        """The latest changes, newest first; those before another one where it is given. Raises NotFound for one that is not there."""
+        older = "" if before is None else "WHERE rowid < (SELECT rowid FROM audit WHERE id = ?)"
+        known = () if before is None else (self.get(before).id,)
+        rows = self._connection.rows(f"SELECT * FROM audit {older} ORDER BY rowid DESC LIMIT ?", *known, limit)
+        return [self._entry(row) for row in rows]
 
     def of(self, category_id: str, limit: int) -> list[AuditEntry]:
         """The latest changes of a category, newest first, also those that it gave bursts to or took them from."""

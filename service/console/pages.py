@@ -38,7 +38,7 @@ class Link:
     title: str
 
 
-NAVIGATION = (Link("/", "Now"), Link("/categories", "Categories"), Link("/observations", "Observations"))
+NAVIGATION = (Link("/", "Now"), Link("/categories", "Categories"), Link("/observations", "Observations"), Link("/memory", "Memory"))
 
 
 def query(**parameters: str | int | None) -> str:

@@ -81,17 +81,21 @@ def change_words(entry: AuditEntry, names: Mapping[str, str | None]) -> str:
         "split": lambda: f"Split {quantity(len(before['instances']), 'burst')} off {this} as {name(after['category'])}",
         "delete": lambda: f"Deleted {quoted(before['name'])} with {quantity(before['instances'], 'burst')}",
         "forget": lambda: f"Took a burst out of {this}",
-        "import": lambda: f"Imported {quantity(len(after['categories']), 'category', 'categories')}",
+        "import": lambda: f"Imported {quantity(len(after['categories']), 'category', 'categories')}" + _twins(len(after["duplicates"])),
         "correct": lambda: "Corrected an observation",
         "reembed": lambda: "Computed the memory anew",
         "undo": lambda: f"Took back: {before['action']}" + (f" of {this}" if entry.category_id in names else ""),
         "calibrate": lambda: _rate_words(after["false_known_rate"]),
-        "backup": lambda: "Backed up the memory",
+        "backup": lambda: f"Backed up the memory to {after['folder']}",
         "export": lambda: f"Exported {quantity(after['categories'], 'category', 'categories')}",
         "key": lambda: f"Made a key for {after['name']}, {after['role']}",
         "revoke": lambda: f"Revoked the key of {before['name']}",
     }
     return words[entry.action]()
+
+
+def _twins(count: int) -> str:
+    return f"; {count} {'was' if count == 1 else 'were'} there already" if count else ""
 
 
 def _rate_words(rate: float | None) -> str:

@@ -1,0 +1,82 @@
+"""/memory: how much there is, how it decides and why there, copies of it, and every change with the way back."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from fastapi import APIRouter, BackgroundTasks, Form, Query, Request, Response
+from fastapi.responses import HTMLResponse, RedirectResponse
+
+from core.novelty import BEST
+from service.agent import Agent
+from service.console.change import done
+from service.console.pages import Page, query, render
+from service.console.score_chart import score_chart
+from service.console.token_map import token_map
+from service.deps import ActorDep, AgentDep, WorkDep
+from service.routes.memory import export_memory
+from service.schemas.memory import ExportQuery, MemoryInfo
+from service.settings import Settings
+from store.records import Errand
+
+router = APIRouter(prefix="/memory", route_class=Page, include_in_schema=False)
+CHANGES = 20
+"""Changes a page."""
+
+
+@router.get("")
+def memory(
+    request: Request, agent: AgentDep, change: Annotated[str | None, Query()] = None, before: Annotated[str | None, Query()] = None
+) -> HTMLResponse:
+    """All of it; further changes alone where htmx asks for them."""
+    changes = agent.memory.audit.latest(CHANGES + 1, before=before)
+    listed: dict[str, Any] = {"changes": changes[:CHANGES], "more": len(changes) > CHANGES, "names": agent.names()}
+    if before is not None and "hx-request" in request.headers:
+        return render(request, "memory_changes.html", **listed)
+    settings: Settings = request.app.state.settings
+    charts = [(verified, score_chart(agent.upkeep.distribution(verified))) for verified in (True, False)]
+    return render(
+        request,
+        "memory.html",
+        **listed,
+        info=MemoryInfo.of(agent),
+        charts=charts if agent.config.score == BEST and agent.config.threshold is None else [],
+        settings=settings,
+        done=done(agent, change),
+    )
+
+
+@router.get("/map")
+def memory_map(request: Request, agent: AgentDep) -> HTMLResponse:
+    """The memory's tokens in a plane: a part of its page, since it reads them all."""
+    names = agent.names()
+    return render(request, "memory_map.html", map=token_map(agent.memory.categories.members(), names), names=names)
+
+
+@router.post("/calibrate")
+def calibrate(agent: AgentDep, actor: ActorDep, percent: Annotated[float | None, Form(ge=0.01, le=50)] = None) -> RedirectResponse:
+    """Keeps a rate; an empty field goes back to the setting's."""
+    agent.upkeep.calibrate(None if percent is None else percent / 100, actor=actor)
+    return _after(agent, "calibrate")
+
+
+@router.post("/backup")
+async def backup(request: Request, agent: AgentDep, work: WorkDep, actor: ActorDep) -> RedirectResponse:
+    """Copies all of it beside the memory."""
+    settings: Settings = request.app.state.settings
+    await work.run(lambda: agent.upkeep.backup(settings.backups, actor=actor))
+    return _after(agent, "backup")
+
+
+@router.post("/export")
+async def export(
+    agent: AgentDep, work: WorkDep, after: BackgroundTasks, actor: ActorDep, category: Annotated[list[str] | None, Form()] = None
+) -> Response:
+    """The chosen categories as a file, all where none are."""
+    return await export_memory(ExportQuery(category_id=category or []), agent, work, after, actor)
+
+
+def _after(agent: Agent, errand: Errand) -> RedirectResponse:
+    """To the page, which tells of the latest of this kind."""
+    latest = next((each.id for each in agent.memory.audit.latest(CHANGES) if each.action == errand), None)
+    return RedirectResponse("/memory" + query(change=latest), 303)
