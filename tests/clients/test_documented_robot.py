@@ -1,4 +1,4 @@
-"""The examples of docs/robot.md do what the page says."""
+"""The examples of README.md and docs/robot.md do what the pages say."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from clients.robot import RobotClient
 
 ROOT = Path(__file__).parents[2]
 LOOP, ASYNCHRONOUS, STREAMS, ARM = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "robot.md").read_text(), re.DOTALL)
+(README,) = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.DOTALL)
 ADDRESS = "http://127.0.0.1:8000"
 
 
@@ -25,6 +26,12 @@ def run(example: str, url: str) -> dict[str, Any]:
     names: dict[str, Any] = {}
     exec(compile(example.replace(ADDRESS, url), "docs/robot.md", "exec"), names)
     return names
+
+
+def test_the_readmes_robot_learns_a_category(url: str, robot: RobotClient, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(ROOT)
+    assert len(run(README, url)["scan"]) == 10
+    assert [(each.name, each.views) for each in robot.categories()] == [("cup", 10)]
 
 
 def test_the_loop_learns_a_category_and_knows_it_then(
