@@ -30,5 +30,5 @@ def find_sequences(data: Path | str) -> list[folders.Sequence]:
         )
     root = Path(rest).expanduser()
     if not root.is_dir():
-        raise InvalidInput("data", f"{root} is no folder")
+        raise InvalidInput("data", f"{root} is no folder; name the one that holds the recordings")
     return FORMATS[prefix](root)

@@ -117,7 +117,7 @@ DRAWN_CATEGORIES = 5
 def read_script(file: Path) -> Script:
     """A script from a YAML file. Raises InvalidInput naming the field that is wrong."""
     if not file.is_file():
-        raise InvalidInput("script", f"there is no file {file}")
+        raise InvalidInput("script", f"there is no file {file}; name a YAML file, or leave it out for the demo")
     try:
         content = yaml.safe_load(file.read_text(encoding="utf-8"))
     except yaml.YAMLError as error:
