@@ -18,6 +18,8 @@ from service.pictures import ComponentColours, mask_picture
 Part = dict[str, Any]
 MOST_POINTS = 14_000
 """Of a surface: each is about 40 bytes of JSON."""
+CELLS = 80
+"""Of a surface, along its longest edge."""
 BESIDE = 1.05
 """Points up to this multiple of the box are the object's; what is farther is background at its edge."""
 PLACES = 4
@@ -70,8 +72,15 @@ def object_surface(burst: Burst, encoded: Sequence[EncodedView], oriented: Orien
     """What the depth images measured of the object, shape (N, 3), metres in the burst's world, and its colours."""
     parts = [_surface(view, each, oriented) for view, each in zip(burst.views, encoded) if view.depth_m is not None]
     points, colours = (np.concatenate([part[index] for part in parts]) if parts else np.empty((0, 3)) for index in (0, 1))
-    kept = np.linspace(0, len(points) - 1, min(len(points), MOST_POINTS)).astype(int)
+    kept = _evenly(points, float(oriented.extent_m.max()) / CELLS)
     return points[kept], colours[kept].astype(np.uint8)
+
+
+def _evenly(points: FloatArray, cell_m: float) -> NDArray[np.intp]:
+    """One point of each cell of a grid, and at most MOST_POINTS: sides that few views show are as dense as those that many do."""
+    cells = np.floor(points / max(cell_m, 1e-6)).astype(np.int64)
+    _, first = np.unique(cells, axis=0, return_index=True)
+    return np.sort(first)[np.linspace(0, len(first) - 1, min(len(first), MOST_POINTS)).astype(int)]
 
 
 def _surface(view: View, encoded: EncodedView, oriented: OrientedBox) -> tuple[FloatArray, NDArray[np.uint8]]:

@@ -49,7 +49,7 @@ function pointsOf(cloud, radius, map) {
     geometry.setAttribute("color", new THREE.BufferAttribute(linear, 3));
   }
   const count = cloud.points.length / 3;
-  const size = Math.min(0.06, 3.6 / Math.sqrt(count || 1)) * radius;
+  const size = Math.min(0.06, 4 / Math.sqrt(count || 1)) * radius;
   const material = new THREE.PointsMaterial({ size, map, alphaTest: 0.5, vertexColors: Boolean(cloud.colours) });
   const points = new THREE.Points(geometry, material);
   points.userData.choice = cloud.choice;
