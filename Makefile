@@ -2,7 +2,7 @@
 SHELL := /bin/bash
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help setup weights demo test lint types unit serve bench clean
+.PHONY: help setup weights demo test lint types unit browser serve bench clean
 
 # The python to build the environment with: the newest of 3.10 and later on the PATH.
 PYTHON ?= $(shell for name in python3.13 python3.12 python3.11 python3.10 python3 python; do \
@@ -15,6 +15,8 @@ OUT ?= out
 
 # Debian's packages with the libraries that Open3D links to.
 LIBRARIES := libusb-1.0-0 libgl1 libegl1 libx11-6 libudev1 libidn2-0
+
+INSTALL_BROWSER = { echo "installing chromium"; apt-get update -qq && apt-get install -y -qq --no-install-recommends chromium; } >&2
 
 INSTALL_LIBRARIES = { echo "installing $(LIBRARIES)"; apt-get update -qq && apt-get install -y -qq --no-install-recommends $(LIBRARIES); } >&2
 
@@ -54,7 +56,11 @@ lint: setup
 types: setup
 	@$(BIN)/mypy
 
-unit: setup
+# The console's tests drive it.
+browser:
+	@command -v chromium >/dev/null || $(if $(filter 0,$(shell id -u)),$(INSTALL_BROWSER),{ echo "the console's tests need Chromium; run: sudo apt-get install chromium" >&2; false; })
+
+unit: setup browser
 	@$(BIN)/pytest
 
 serve: setup ## the service on 127.0.0.1:8000

@@ -18,6 +18,7 @@ from service.agent import Agent, AgentConfig
 from service.auth import Guard
 from service.batching import BatchingBackbone
 from service.browsers import OwnPagesOnly
+from service.console.demo import Demo
 from service.console.install import install as install_console
 from service.events import Events
 from service.limits import UploadLimit
@@ -53,7 +54,10 @@ def create_app(settings: Settings, *, backbone: Backbone | None = None, asks: bo
             metrics.watch_work(lambda: work.pending)
             async with anyio.create_task_group() as tasks:
                 tasks.start_soon(_keep_pruned, agent.memory)
-                yield
+                try:
+                    yield
+                finally:
+                    await run_sync(app.state.demo.close)
                 tasks.cancel_scope.cancel()
 
     app = FastAPI(
@@ -66,6 +70,7 @@ def create_app(settings: Settings, *, backbone: Backbone | None = None, asks: bo
     app.state.settings = settings
     app.state.metrics = metrics
     app.state.tracks = 0
+    app.state.demo = Demo()
     app.add_middleware(UploadLimit, max_mb=settings.max_upload_mb)
     app.add_middleware(OwnPagesOnly)
     app.add_middleware(Measured, metrics=metrics)

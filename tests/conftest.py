@@ -7,6 +7,10 @@ are known exactly.
 from __future__ import annotations
 
 import os
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
@@ -21,6 +25,8 @@ from core.views import Camera, View
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+    from service.settings import Settings
 
 settings.register_profile("repeatable", derandomize=True, deadline=None, database=None)
 settings.load_profile("repeatable")
@@ -119,3 +125,29 @@ def embedded_backbone() -> Backbone:
     from core.backbones.dino import load_backbone
 
     return load_backbone()
+
+
+@contextmanager
+def _serving(settings: Settings, backbone: Backbone) -> Iterator[str]:
+    """The address of a live service."""
+    import uvicorn
+
+    from service.app import create_app
+
+    app = create_app(settings, backbone=backbone)
+    server = uvicorn.Server(uvicorn.Config(app, host="127.0.0.1", port=0, log_level="warning", timeout_graceful_shutdown=1))
+    thread = threading.Thread(target=server.run, daemon=True)
+    thread.start()
+    while not server.started:
+        time.sleep(0.01)
+    try:
+        yield f"http://127.0.0.1:{server.servers[0].sockets[0].getsockname()[1]}"
+    finally:
+        server.should_exit = True
+        thread.join()
+
+
+@pytest.fixture(scope="session")
+def serving() -> Callable[[Settings, Backbone], AbstractContextManager[str]]:
+    """serving(settings, backbone): a live service, whose address it gives."""
+    return _serving

@@ -38,7 +38,13 @@ class Link:
     title: str
 
 
-NAVIGATION = (Link("/", "Now"), Link("/categories", "Categories"), Link("/observations", "Observations"), Link("/memory", "Memory"))
+NAVIGATION = (
+    Link("/", "Now"),
+    Link("/categories", "Categories"),
+    Link("/observations", "Observations"),
+    Link("/memory", "Memory"),
+    Link("/try", "Try it"),
+)
 
 
 def query(**parameters: str | int | None) -> str:

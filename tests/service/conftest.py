@@ -4,17 +4,13 @@ from __future__ import annotations
 
 import io
 import json
-import threading
-import time
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
 import pytest
-import uvicorn
 from fastapi.testclient import TestClient
 
 from core.backbones.base import Backbone
@@ -115,30 +111,8 @@ def learn(client: TestClient, look: Any, parts: Any) -> Callable[..., dict[str, 
     return category
 
 
-@contextmanager
-def _serving(settings: Settings, backbone: Backbone) -> Iterator[str]:
-    """The address of a live service."""
-    app = create_app(settings, backbone=backbone)
-    server = uvicorn.Server(uvicorn.Config(app, host="127.0.0.1", port=0, log_level="warning", timeout_graceful_shutdown=1))
-    thread = threading.Thread(target=server.run, daemon=True)
-    thread.start()
-    while not server.started:
-        time.sleep(0.01)
-    try:
-        yield f"http://127.0.0.1:{server.servers[0].sockets[0].getsockname()[1]}"
-    finally:
-        server.should_exit = True
-        thread.join()
-
-
-@pytest.fixture(scope="session")
-def serving() -> Callable[[Settings, Backbone], AbstractContextManager[str]]:
-    """serving(settings, backbone): a live service, whose address it gives."""
-    return _serving
-
-
 @pytest.fixture
-def live(settings: Settings, backbone: Backbone) -> Iterator[str]:
+def live(settings: Settings, backbone: Backbone, serving: Any) -> Iterator[str]:
     """The address of a live service with an empty memory."""
-    with _serving(settings, backbone) as url:
+    with serving(settings, backbone) as url:
         yield url

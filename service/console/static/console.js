@@ -43,3 +43,18 @@ document.addEventListener("htmx:afterRequest", (event) => {
   const told = event.detail.xhr?.getResponseHeader("X-Notice");
   if (told) notice(decodeURIComponent(told));
 });
+
+// Tabs that htmx answers: the one pressed last is the current one.
+document.addEventListener("click", (event) => {
+  const tab = event.target.closest("[data-tab]");
+  tab?.parentElement.querySelectorAll("[data-tab]").forEach((each) => each.toggleAttribute("aria-current", false));
+  tab?.setAttribute("aria-current", "true");
+});
+
+// A field that makes sense only while a choice is left at its first, empty option.
+document.querySelectorAll("[data-only-for]").forEach((field) => {
+  const choice = document.getElementById(field.dataset.onlyFor);
+  const follow = () => (field.hidden = choice.value !== "");
+  choice.addEventListener("change", follow);
+  follow();
+});
