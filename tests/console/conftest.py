@@ -21,6 +21,8 @@ from service.settings import Settings
 TABLET = {"width": 1180, "height": 820}
 WAIT_MS = 30_000
 """For answers of the backbone, on a machine that does other things too."""
+FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+"""For root, and for 3-D on a machine without a graphics card."""
 SERIOUS = {"serious", "critical"}
 expect.set_options(timeout=WAIT_MS)
 
@@ -84,7 +86,7 @@ def browser() -> Iterator[Browser]:
     path = shutil.which("chromium")
     assert path is not None, "Chromium is missing; run `make browser`, or as root: apt-get install chromium"
     with sync_playwright() as playwright:
-        opened = playwright.chromium.launch(executable_path=path, args=["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"])
+        opened = playwright.chromium.launch(executable_path=path, args=FLAGS)
         yield opened
         opened.close()
 
