@@ -44,6 +44,7 @@ SOURCES = (
     "hypotheses.py",
     "matched_pair.py",
     "matches.py",
+    "normals.py",
     "pose.py",
     "reference.py",
     "sim3.py",

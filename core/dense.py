@@ -16,11 +16,14 @@ from core.affine9 import Affine9, fit_affine9
 from core.boxes import cloud_extent_m, inliers
 from core.encode import EncodedView
 from core.estimators.batched import Sim3Batch, umeyama_batch
+from core.normals import outward_normals
 from core.sim3 import Sim3
 from core.views import FloatArray
 
 BATCH = 32
 """Transforms scored at once; bounds memory at BATCH · N · Q numbers."""
+OPPOSITE = -0.5
+"""Cosine between normals below which surfaces face opposite ways: 120° apart, since objects of a kind differ and normals are noisy."""
 
 
 @dataclass(frozen=True)
@@ -53,18 +56,20 @@ class DenseAgreement:
     ) -> None:
         """From views with trusted patches only, and the unit descriptors of those patches, one array a view."""
         self.config = config
-        self._reference, of_reference = _draw(reference, descriptors[0], config.points, seed)
-        self._target, of_target = _draw(target, descriptors[1], config.points, seed + 1)
+        self._reference, of_reference, self._faces_reference = _draw(reference, descriptors[0], config.points, seed)
+        self._target, of_target, self._faces_target = _draw(target, descriptors[1], config.points, seed + 1)
         self.extent_m = cloud_extent_m(self._target.numpy())
         self._log_cosine = (of_reference @ of_target.T).clamp_min(1e-4).log()
 
     def score(self, transforms: Sim3Batch) -> Tensor:
         """Agreement in [0, 1], shape (T,): mean over points of max over the other object of exp(−(d/σ)²)·max(0, cosine),
-        geometric mean of both directions."""
+        geometric mean of both directions. Surfaces that face opposite ways do not agree, however near: a thin thing face down does
+        not lie on one face up."""
         parts = []
         for start in range(0, len(transforms), BATCH):
             batch = transforms.select(range(start, min(start + BATCH, len(transforms))))
-            log = self._log_agreement(batch.apply(self._reference), self.config.sigma, 1.0)
+            facing = self._faces_reference @ batch.rotation.transpose(1, 2) @ self._faces_target.T
+            log = self._log_agreement(batch.apply(self._reference), self.config.sigma, 1.0).masked_fill_(facing < OPPOSITE, -torch.inf)
             parts.append((log.amax(dim=2).exp().mean(dim=1) * log.amax(dim=1).exp().mean(dim=1)).sqrt())
         return torch.cat(parts)
 
@@ -104,8 +109,11 @@ class DenseAgreement:
         return power * self._log_cosine - (distance / (sigma * self.extent_m)) ** 2
 
 
-def _draw(views: Sequence[EncodedView], descriptors: Sequence[FloatArray], count: int, seed: int) -> tuple[Tensor, Tensor]:
-    """Random points without outliers, shape (N, 3), and their descriptors, shape (N, C)."""
+def _draw(views: Sequence[EncodedView], descriptors: Sequence[FloatArray], count: int, seed: int) -> tuple[Tensor, Tensor, Tensor]:
+    """Random points without outliers, shape (N, 3), their descriptors, shape (N, C), and where they face, shape (N, 3)."""
     points = np.concatenate([view.points_m for view in views])
     kept = np.random.default_rng(seed).permutation(inliers(points))[:count]
-    return torch.from_numpy(points[kept]).float(), torch.from_numpy(np.concatenate(descriptors)[kept]).float()
+    drawn, described, faces = (
+        torch.from_numpy(each[kept]).float() for each in (points, np.concatenate(descriptors), outward_normals(views))
+    )
+    return drawn, described, faces

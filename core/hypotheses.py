@@ -63,13 +63,19 @@ def propose(pair: MatchedPair, config: HypothesesConfig, threshold_m: float, see
     return together.select(((off < config.max_scale_ratio) & (off > 1 / config.max_scale_ratio)).nonzero().flatten())
 
 
-def distinct(transforms: Sim3Batch, scores: torch.Tensor, angle_deg: float, count: int) -> list[int]:
-    """Indices of up to `count` transforms, best score first, whose rotations differ by at least `angle_deg`."""
+def distinct(transforms: Sim3Batch, scores: torch.Tensor, angle_deg: float, count: int, symmetries: FloatArray | None = None) -> list[int]:
+    """Indices of up to `count` transforms, best score first, whose rotations differ by at least `angle_deg`.
+
+    With `symmetries` of the reference, shape (S, 3, 3), also from what those before them are after one.
+    """
+    turns = np.concatenate([np.eye(3)[None], np.zeros((0, 3, 3)) if symmetries is None else symmetries])
     rotations = transforms.rotation.numpy().astype(float)
+    told = np.zeros((0, 3, 3))
     kept: list[int] = []
     for index in scores.argsort(descending=True).tolist():
-        if not kept or angles_deg(rotations[index][None], rotations[kept]).min() >= angle_deg:
+        if not kept or angles_deg(rotations[index][None], told).min() >= angle_deg:
             kept.append(index)
+            told = np.concatenate([told, rotations[index] @ turns])
         if len(kept) == count:
             break
     return kept

@@ -27,8 +27,8 @@ from core.pnp import by_pnp
 from core.reference import Reference
 from core.sim3 import Sim3
 from core.solvers import axis_scales, by_consensus, by_retrieval, by_single_view, judge, stretched
-from core.symmetry import without_twins
 from core.viewpoints import view_agreement
+from core.views import FloatArray
 
 
 @dataclass(frozen=True)
@@ -164,15 +164,13 @@ class PoseEstimator:
         pair = MatchedPair(reference, target, dims, config.correspondences, config.method, depth=needed)
         clock.lap("match")
         threshold_m = self.config.inlier_ratio * cloud_extent_m(target.cloud_m)
-        estimate = self._solve(pair, threshold_m, seed, clock)
-        others = without_twins(estimate.alternatives, estimate.target_from_reference, reference.symmetries, config.best.alternative_deg)
-        estimate = replace(estimate, alternatives=others)
+        estimate = self._solve(pair, reference.symmetries, threshold_m, seed, clock)
         if config.dof == 9:
             estimate = self._stretch(estimate, pair, Sim3.from_matrix(reference.box.world_from_object), threshold_m, seed)
             clock.lap("axis scales")
         return replace(estimate, matches=pair.among_all_patches(estimate.matches), stage_ms=clock.stage_ms)
 
-    def _solve(self, pair: MatchedPair, threshold_m: float, seed: int, clock: StageClock) -> PoseEstimate:
+    def _solve(self, pair: MatchedPair, symmetries: FloatArray, threshold_m: float, seed: int, clock: StageClock) -> PoseEstimate:
         config = self.config
         if config.solver == "retrieval":
             return by_retrieval(pair, config.consensus_deg, threshold_m, clock)
@@ -182,7 +180,7 @@ class PoseEstimator:
             return by_consensus(pair, config.consensus_deg, ESTIMATORS[config.estimator], threshold_m, seed, clock)
         if config.solver == "pnp":
             return by_pnp(pair, config.inlier_ratio, seed, clock)
-        return self._by_agreement(pair, threshold_m, seed, clock)
+        return self._by_agreement(pair, symmetries, threshold_m, seed, clock)
 
     def _stretch(self, estimate: PoseEstimate, pair: MatchedPair, world_from_object: Sim3, threshold_m: float, seed: int) -> PoseEstimate:
         """9-D where that is determined, else 7-D as it was."""
@@ -197,8 +195,11 @@ class PoseEstimator:
             return replace(estimate, not_9d_because=str(error))
         return stretched(estimate, transform, pair, world_from_object, threshold_m)
 
-    def _by_agreement(self, pair: MatchedPair, threshold_m: float, seed: int, clock: StageClock) -> PoseEstimate:
-        """Ours: many hypotheses, the most promising refined, the one that lays the objects on each other best."""
+    def _by_agreement(self, pair: MatchedPair, symmetries: FloatArray, threshold_m: float, seed: int, clock: StageClock) -> PoseEstimate:
+        """Ours: many hypotheses, the most promising refined, the one that lays the objects on each other best.
+
+        Of poses that are the same after a symmetry of the reference the best alone is listed: they are no rivals.
+        """
         config = self.config.best
         guesses = propose(pair, config.hypotheses, threshold_m, seed)
         if not len(guesses):
@@ -212,7 +213,7 @@ class PoseEstimator:
         views = view_agreement(refined.rotation.numpy(), pair.relative, pair.similarity, config.view_deg)
         weight = min(config.view_weight * len(pair.target), config.most_view_weight)
         scores = agreement.score(refined) * torch.from_numpy(np.exp(weight * views))
-        ranked = distinct(refined, scores, config.alternative_deg, 1 + config.alternatives)
+        ranked = distinct(refined, scores, config.alternative_deg, 1 + config.alternatives, symmetries)
         clock.lap("refine")
         winner = refined.select(ranked[:1])
         if config.polish is not None:

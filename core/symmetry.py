@@ -22,9 +22,8 @@ from core.boxes import OrientedBox, cloud_extent_m, inliers
 from core.descriptors import PcaBasis, unit
 from core.encode import EncodedView
 from core.errors import NoPose
-from core.matches import Alternative
 from core.scan import infer_up
-from core.sim3 import Sim3, rotation_angle_deg, umeyama
+from core.sim3 import Sim3, umeyama
 from core.views import FloatArray
 
 CONTINUOUS = 12
@@ -81,17 +80,6 @@ def find_symmetries(views: Sequence[EncodedView], basis: PcaBasis, box: Oriented
         return np.zeros((0, 3, 3))
     found = [turn for axis in (up, *others) for turn in _about(matches, axis, center, config)]
     return np.array(found).reshape(-1, 3, 3)
-
-
-def without_twins(alternatives: Sequence[Alternative], best: Sim3, symmetries: FloatArray, least_deg: float) -> tuple[Alternative, ...]:
-    """The alternatives that are not the best pose, nor one another, but for a symmetry, shape (S, 3, 3), to within `least_deg`."""
-    turns = np.concatenate([np.eye(3)[None], np.asarray(symmetries, dtype=float).reshape(-1, 3, 3)])
-    told, kept = best.rotation @ turns, []
-    for each in alternatives:
-        if rotation_angle_deg(each.target_from_reference.rotation, told).min() >= least_deg:
-            told = np.concatenate([told, each.target_from_reference.rotation @ turns])
-            kept.append(each)
-    return tuple(kept)
 
 
 class _SelfAgreement:

@@ -81,8 +81,10 @@ def near_their_mean(rotations: FloatArray, angle_deg: float) -> NDArray[np.bool_
 def view_agreement(rotations: FloatArray, relative: FloatArray, view_similarity: FloatArray, angle_deg: float) -> FloatArray:
     """How much more similar than others the view pairs are that a rotation brings together, shape (T,).
 
-    The similarities of each target view are standardised over the reference views, then averaged with weights that fall off with the
-    angle between a pair's relative rotation and the one asked about. It tells front from back where single patches cannot.
+    The similarities of each target view are standardised over the reference views, and lose what a reference view has in common with
+    all target views: the light of a room from one side, or a place from which little of an object is seen. They are then averaged with
+    weights that fall off with the angle between a pair's relative rotation and the one asked about. It tells front from back where
+    single patches cannot.
 
     Args:
         rotations: target_from_reference, shape (T, 3, 3).
@@ -91,5 +93,7 @@ def view_agreement(rotations: FloatArray, relative: FloatArray, view_similarity:
     """
     spread = view_similarity.std(axis=0)
     standard = (view_similarity - view_similarity.mean(axis=0)) / np.where(spread > 0, spread, 1.0)
+    if standard.shape[1] > 1:
+        standard = standard - standard.mean(axis=1, keepdims=True)
     weights = np.exp(-((angles_deg(rotations, relative.reshape(-1, 3, 3)) / angle_deg) ** 2))
     return weights @ standard.ravel() / np.maximum(weights.sum(axis=1), 1e-6)

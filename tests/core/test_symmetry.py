@@ -9,11 +9,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from core.encode import EncodedBurst
-from core.matches import Alternative
 from core.pose import PoseConfig, PoseEstimator
 from core.reference import Reference, build_reference
 from core.sim3 import Sim3, rotation_angle_deg
-from core.symmetry import without_twins
 from core.views import FloatArray
 
 from .conftest import PaintedObject
@@ -101,17 +99,6 @@ def test_nothing_is_claimed_of_a_side_that_was_not_seen(moved: Sim3) -> None:
 def test_the_same_scan_gives_the_same_symmetries(moved: Sim3) -> None:
     first, second = (scanned(body(ROUND, repeated(2)), moved).symmetries for _ in range(2))
     np.testing.assert_array_equal(first, second)
-
-
-def turned(degrees: float) -> Sim3:
-    return Sim3(1.0, Rotation.from_euler("z", degrees, degrees=True).as_matrix(), np.zeros(3))
-
-
-def test_a_twin_is_no_alternative() -> None:
-    half_turn = turned(180).rotation[None]
-    listed = tuple(Alternative(turned(angle), 1 - angle / 1000) for angle in (170, 90, 265, 45))
-    assert without_twins(listed, turned(0), half_turn, 30) == (listed[1], listed[3])
-    assert without_twins(listed, turned(0), np.zeros((0, 3, 3)), 30) == listed
 
 
 def test_a_pose_of_a_symmetric_object_is_right_but_for_its_symmetry(moved: Sim3) -> None:
