@@ -40,6 +40,8 @@ def simulate(
 ) -> None:
     """Drive a service with a simulated robot: meet objects, learn the novel, recognise the known, report.
 
+    Exits with 1 where the memory is not what the robots made of it.
+
     \f
     Options that are given win over what the script says.
     """
@@ -64,6 +66,8 @@ def simulate(
         )
     if json:
         print_json(asdict(summary))
+    if not plan.teacher and summary.disagreements:
+        raise typer.Exit(1)
 
 
 @contextmanager

@@ -6,7 +6,7 @@ import json
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from rich.console import Console
@@ -80,14 +80,15 @@ def run_episode(script: Script, url: str, output: Output, console: Console, *, r
         live_ones = _kept(together(episodes) if len(episodes) > 1 else iter(episodes[0]), output.lines, script, done)
         encounters = [*done, *live.show(live_ones, total - len(done), console)]
         summary = summarise(encounters, time.perf_counter() - started)
+        summary = replace(summary, disagreements=tuple(disagreements(robots[0], encounters)))
         with console.status("drawing the report"):
             record = _record(robots[0], script, encounters, summary)
-        wrong = disagreements(robots[0], encounters)
     write_report(record, output.folder / "report.html")
     write_json(record, output.folder / "episode.json")
     console.print(live.summary_table(summary))
-    if script.robots > 1:
-        console.print(f"memory: {'; '.join(wrong) if wrong else f'right after {script.robots} robots'}", style="red" if wrong else "green")
+    wrong = "; ".join(summary.disagreements)
+    if wrong or script.robots > 1:
+        console.print(f"memory: {wrong or f'right after {script.robots} robots'}", style="red" if wrong else "green")
     console.print(f"\nreport: {output.folder / 'report.html'}")
     return summary
 

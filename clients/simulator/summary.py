@@ -46,6 +46,8 @@ class Summary:
     motion_s: float
     """Simulated time that arms moved, all together."""
     total_s: float
+    disagreements: tuple[str, ...] = ()
+    """Where the memory is not what the encounters made of it, in words."""
 
     @property
     def false_novel_rate(self) -> float | None:
