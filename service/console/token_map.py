@@ -14,7 +14,7 @@ from core.descriptors import unit
 from core.novelty import Member
 from core.views import FloatArray
 
-WIDTH, HEIGHT, ROOM = 640, 420, 36
+WIDTH, HEIGHT, ROOM = 960, 420, 44
 MOST = 2000
 """Bursts drawn; of more, evenly chosen ones."""
 HUES = 10
@@ -22,7 +22,7 @@ HUES = 10
 LABELLED = 40
 """Categories that are named in the drawing; more names would cover it."""
 
-LABEL_WIDTH, LABEL_HEIGHT = 60, 15
+LABEL_WIDTH, LABEL_HEIGHT = 60, 16
 """That a name takes up, about."""
 
 
@@ -86,7 +86,8 @@ def _plane(tokens: FloatArray) -> tuple[FloatArray, float]:
     axes = vectors[:, :-3:-1]
     axes = axes * np.sign(axes[np.abs(axes).argmax(axis=0), [0, 1]])
     flat = centred @ axes
-    half = np.maximum(np.abs(flat).max(axis=0), 1e-9)
-    scale = min((WIDTH / 2 - ROOM) / half[0], (HEIGHT / 2 - ROOM) / half[1])
+    low, high = flat.min(axis=0), flat.max(axis=0)
+    across, down = np.maximum(high - low, 1e-9)
+    scale = min((WIDTH - 2 * ROOM) / across, (HEIGHT - 2 * ROOM) / down)
     explained = float(variances[-2:].sum() / max(float(variances.sum()), 1e-12))
-    return np.asarray(flat * (scale, -scale) + (WIDTH / 2, HEIGHT / 2)), explained
+    return np.asarray((flat - (low + high) / 2) * (scale, -scale) + (WIDTH / 2, HEIGHT / 2 + ROOM / 4)), explained

@@ -134,4 +134,6 @@ def test_alike_bursts_are_near_each_other_in_the_map():
 
 def test_one_burst_is_drawn_too():
     shown = token_map([Member("c", np.zeros((1, 4)), np.ones((1, 4)))], {"c": "cup"})
-    assert [(point.x, point.y) for point in shown.points] == [(MAP_WIDTH / 2, HEIGHT / 2)]
+    ((x, y),) = [(point.x, point.y) for point in shown.points]
+    assert 0 < x < MAP_WIDTH
+    assert 0 < y < HEIGHT
