@@ -10,6 +10,7 @@ from fastapi.responses import HTMLResponse
 
 from service.agent import Agent
 from service.console.hemisphere import Hemisphere, hemisphere_of
+from service.console.observations import learnt_from
 from service.console.pages import Page, render
 from service.deps import AgentDep
 from service.events import Kind
@@ -38,13 +39,15 @@ class ScanShown:
 def now(request: Request, agent: AgentDep) -> HTMLResponse:
     """The latest observations, the scans in progress, and what changed."""
     heard = agent.events.last_id  # before anything is read: what happens meanwhile is told once more, never missed
+    observations = agent.memory.observations.latest(LATEST)
     return render(
         request,
         "now.html",
         heard=heard,
         most=LATEST,
         kinds=sorted(set(get_args(Kind)) - {"observation", "dropped"}),
-        observations=agent.memory.observations.latest(LATEST),
+        observations=observations,
+        learnt=learnt_from(agent, observations),
         scans=_scans(agent),
         changes=agent.memory.audit.latest(CHANGES),
         names=agent.names(),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Form, Query, Request, Response
@@ -44,6 +45,7 @@ def observations(
         outcome=outcome,
         category_id=category_id,
         names=agent.names(),
+        learnt=learnt_from(agent, found),
     )
 
 
@@ -72,7 +74,8 @@ def observation(request: Request, observation_id: str, agent: AgentDep, show: Pi
 @router.get("/{observation_id}/card")
 def observation_card(request: Request, observation_id: str, agent: AgentDep) -> HTMLResponse:
     """As it is in lists."""
-    return render(request, "observation_card.html", observation=agent.memory.observations.get(observation_id), names=agent.names())
+    seen = agent.memory.observations.get(observation_id)
+    return render(request, "observation_card.html", observation=seen, names=agent.names(), learnt=learnt_from(agent, [seen]))
 
 
 @router.get("/{observation_id}/views")
@@ -116,6 +119,12 @@ async def observation_correct(
     given = (category_id or None, None if category_id else name.strip() or None)
     await work.run(lambda: agent.curation.correct(observation_id, *given, actor=caller.as_actor("console")))
     return Response(status_code=204, headers={"HX-Refresh": "true"})
+
+
+def learnt_from(agent: Agent, observations: Sequence[Observation]) -> dict[str, str]:
+    """Of those whose object was scanned: by their ids the categories that this made."""
+    scans = {seen.id: agent.memory.scans.get(seen.scan_id) for seen in observations if seen.scan_id is not None}
+    return {observation_id: scan.category_id for observation_id, scan in scans.items() if scan.category_id is not None}
 
 
 def _may_correct(request: Request) -> bool:
