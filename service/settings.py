@@ -38,7 +38,7 @@ class Settings(BaseSettings):
     workers: int = Field(2, gt=0, description="Requests that are worked on at once; those that come together share passes of the backbone.")
     queue: int = Field(16, ge=0, description="Requests that may wait; more are answered 503 with Retry-After.")
     max_tracks: int = Field(4, ge=0, description="Objects that are followed at once over WS /v1/track.")
-    rate_limit: int = Field(1200, gt=0, description="Requests a minute with one key; more are answered 429 with Retry-After.")
+    rate_limit: int = Field(3000, gt=0, description="Requests a minute with one key; more are answered 429 with Retry-After.")
     session_h: float = Field(12, gt=0, description="Hours after which somebody who signed in to the console is signed out.")
     backup_dir: Path | None = Field(None, description="Folder that backups are made in; beside the memory where left out.")
     max_views: int = Field(32, gt=0, description="Most views in one burst.")
