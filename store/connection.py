@@ -22,6 +22,10 @@ from store.schema import upgrade
 Row = dict[str, Any]
 DATABASE = "memory.sqlite3"
 
+TAKE_TURN = "UPDATE meta SET value = value WHERE key = 'memory_version'"
+"""Changes nothing, and comes first: SQLite waits for another process (`onelook keys`) to end its change only before a transaction has
+read anything."""
+
 running_request: ContextVar[tuple[str, str] | None] = ContextVar("running_request", default=None)
 """Key and route of the repeatable request that the present changes are made for; see store/requests.py."""
 
@@ -87,6 +91,7 @@ class Connection:
         """One transaction that changes nothing a reader could see. Raises as `change` does."""
         try:
             with self._lock, self._db.atomic():
+                self._db.execute(TAKE_TURN)
                 yield self._db
         except sqlite3.IntegrityError as error:
             raise Conflict("a category, scan or observation that this needs was deleted meanwhile; send the request again") from error

@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import sqlite3
+import threading
 from datetime import timedelta
 from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from core.errors import Conflict, InvalidInput, NotFound
-from store.keys import Key
+from core.errors import Conflict, InvalidInput, NotFound, Unavailable
+from store.keys import Key, Keys
 from store.memory import Memory
+
+TURNS = 25
+"""Without waiting, the first few fail already."""
 
 
 def test_a_key_is_found_by_its_text(memory: Memory) -> None:
@@ -129,3 +135,36 @@ def test_a_session_is_over_with_its_key(memory: Memory, key: Key) -> None:
     token = memory.sessions.begin(key, timedelta(hours=1))
     memory.keys.revoke(key.id)
     assert memory.sessions.find(token) is None
+
+
+def test_two_processes_that_change_keys_wait_for_each_other(memory: Memory, folder: Path) -> None:
+    """Both read before they write: SQLite refuses such a transaction where another one was committed in between."""
+    failed: list[Exception] = []
+
+    def work(keys: Keys, prefix: str) -> None:
+        try:
+            for index in range(TURNS):
+                key, _ = keys.create(f"{prefix} {index}", "robot")
+                keys.revoke(key.id)
+        except Unavailable as error:
+            failed.append(error)
+
+    with Memory.keyring(folder) as beside:
+        threads = [threading.Thread(target=work, args=each) for each in ((memory.keys, "service"), (beside, "command"))]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+    assert failed == []
+    assert memory.keys.all() == []
+
+
+def test_no_text_is_a_key_by_chance(memory: Memory) -> None:
+    key, _ = memory.keys.create("arm", "robot")
+
+    @given(st.text())
+    def whatever(text: str) -> None:
+        assert all(memory.keys.find(each) is None for each in (text, f"onelook_{text}", f"onelook_{key.id}_{text}"))
+        assert memory.sessions.find(text) is None
+
+    whatever()
