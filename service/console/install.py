@@ -7,10 +7,12 @@ from fastapi import FastAPI
 from service.console import categories, change, memory, now, observations, sign_in, trying
 from service.console.assets import PREFIX, Assets
 
+PAGES = (now, categories, change, observations, memory, trying, sign_in)
+ROUTERS = (*(page.router for page in PAGES), categories.pictures)
+
 
 def install(app: FastAPI) -> None:
     """Its pages, and the files they need."""
-    for page in (now, categories, change, observations, memory, trying, sign_in):
-        app.include_router(page.router)
-    app.include_router(categories.pictures)
+    for router in ROUTERS:
+        app.include_router(router)
     app.mount(PREFIX, Assets(), name="static")
