@@ -15,7 +15,7 @@ from core.errors import Conflict, InvalidInput, NotFound, Unavailable
 from store.keys import Key, Keys
 from store.memory import Memory
 
-TURNS = 25
+TURNS = 10
 """Without waiting, the first few fail already."""
 
 
