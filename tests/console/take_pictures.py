@@ -3,7 +3,8 @@
     make demo
     python tests/console/take_pictures.py --run out/demo --out docs/console
 
-The robot of the demo learns categories without names; here they get those of the episode's report. The memory is copied, not changed.
+The robot of the demo learns categories without names; here they get those of the episode's report, and one more object is being scanned.
+The memory is copied, not changed.
 """
 
 from __future__ import annotations
@@ -24,14 +25,19 @@ import cv2  # noqa: E402
 import numpy as np  # noqa: E402
 from playwright.sync_api import Browser, Page, sync_playwright  # noqa: E402
 
+from clients.datasets.folders import find_sequences, load_burst  # noqa: E402
 from clients.robot import RobotClient  # noqa: E402
 from clients.simulator.local_service import local_service  # noqa: E402
 
 WIDE = {"width": 1280, "height": 860}
 PHONE = {"width": 390, "height": 780}
-SCALE = 1.5
-"""Pixels of the pictures for one of the page."""
-QUALITY = 82
+QUALITY = 70
+DARK = ("now", "category")
+"""Pages that are also taken in the dark."""
+LONG = ("observation", "category", "memory")
+"""Pages that are taken whole."""
+SCANNED = 7
+"""Views of the scan in progress."""
 FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 
 
@@ -48,12 +54,14 @@ def main() -> None:
         with local_service(memory, Path(folder) / "log") as url, sync_playwright() as playwright:
             with RobotClient(url) as robot:
                 name(robot, asked.run / "episode.json")
+                begin_scan(robot)
                 paths = addresses(robot)
             browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=FLAGS)
-            for scheme in ("light", "dark"):
-                for title, path in paths.items():
+            for scheme, titles in (("light", tuple(paths)), ("dark", DARK)):
+                for title in titles:
+                    path = paths[title]
                     with page(browser, scheme, WIDE, url + path) as opened:
-                        save(opened, asked.out / f"{title}-{scheme}.jpg", whole=title in {"observation", "category", "memory"})
+                        save(opened, asked.out / f"{title}-{scheme}.jpg", whole=title in LONG)
             with page(browser, "light", PHONE, url + "/") as opened:
                 save(opened, asked.out / "now-phone.jpg", whole=False)
             browser.close()
@@ -66,10 +74,20 @@ def name(robot: RobotClient, report: Path) -> None:
             robot.rename(row["learnt"], row["category"])
 
 
+def begin_scan(robot: RobotClient) -> None:
+    """Something new, part of whose views came."""
+    (sequence,) = find_sequences(ROOT / "tests" / "data" / "bursts" / "cup" / "cup_1")
+    burst = load_burst(sequence)
+    seen = robot.observe(burst.select(range(0, len(burst), 2)), learn=False)
+    assert seen.scan is not None, seen.outcome
+    for view in burst.views[:SCANNED]:
+        seen.scan.add(view)
+
+
 def addresses(robot: RobotClient) -> dict[str, str]:
-    """Of each page; of the known observations the one with the most inliers, and its category."""
+    """Of each page; of the known observations the one whose points meet the reference's best for its size, and its category."""
     known = [each for each in robot.observations(limit=50, outcome="known") if each.pose is not None]
-    shown = max(known, key=lambda each: each.pose.inliers)  # type: ignore[union-attr]
+    shown = min(known, key=lambda each: each.pose.residual_m / max(each.pose.extent_m))
     ones = {"observation": f"/observations/{shown.id}", "category": f"/categories/{shown.category_id}"}
     return {"now": "/", "categories": "/categories", "observations": "/observations", "memory": "/memory", "try": "/try"} | ones
 
@@ -77,7 +95,7 @@ def addresses(robot: RobotClient) -> dict[str, str]:
 @contextmanager
 def page(browser: Browser, scheme: str, size: dict[str, int], address: str) -> Iterator[Page]:
     """One, once it is drawn."""
-    context = browser.new_context(viewport=size, color_scheme=scheme, device_scale_factor=SCALE, reduced_motion="reduce")
+    context = browser.new_context(viewport=size, color_scheme=scheme, reduced_motion="reduce")
     opened = context.new_page()
     opened.goto(address)
     for viewer in opened.locator("figure.viewer").all():
