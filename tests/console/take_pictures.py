@@ -1,7 +1,7 @@
 """Pictures of the console's pages for docs/, light and dark, of the memory that `make demo` leaves.
 
     make demo
-    python tests/console/take_pictures.py --run out/demo --out docs/console
+    python tests/console/take_pictures.py --run out/demo --category locomotive --out docs/console
 
 The robot of the demo learns categories without names; here they get those of the episode's report, and one more object is being scanned.
 The memory is copied, not changed.
@@ -31,7 +31,7 @@ from clients.simulator.local_service import local_service  # noqa: E402
 
 WIDE = {"width": 1280, "height": 860}
 PHONE = {"width": 390, "height": 780}
-QUALITY = 70
+QUALITY = 62
 DARK = ("now", "category")
 """Pages that are also taken in the dark."""
 LONG = ("observation", "category", "memory")
@@ -45,6 +45,7 @@ def main() -> None:
     """See module."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--run", type=Path, default=Path("out/demo"))
+    parser.add_argument("--category", help="Whose page is shown, and an observation of it.")
     parser.add_argument("--out", type=Path, default=Path("docs/console"))
     asked = parser.parse_args()
     asked.out.mkdir(parents=True, exist_ok=True)
@@ -55,7 +56,7 @@ def main() -> None:
             with RobotClient(url) as robot:
                 name(robot, asked.run / "episode.json")
                 begin_scan(robot)
-                paths = addresses(robot)
+                paths = addresses(robot, asked.category)
             browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=FLAGS)
             for scheme, titles in (("light", tuple(paths)), ("dark", DARK)):
                 for title in titles:
@@ -84,10 +85,10 @@ def begin_scan(robot: RobotClient) -> None:
         seen.scan.add(view)
 
 
-def addresses(robot: RobotClient) -> dict[str, str]:
-    """Of each page; of the known observations the one whose points meet the reference's best for its size, and its category."""
-    known = [each for each in robot.observations(limit=50, outcome="known") if each.pose is not None]
-    shown = min(known, key=lambda each: each.pose.residual_m / max(each.pose.extent_m))
+def addresses(robot: RobotClient, category: str | None) -> dict[str, str]:
+    """Of each page; of the known observations, of this category if one is named, the one with the surest pose."""
+    known = [each for each in robot.observations(limit=50, outcome="known") if each.pose is not None and category in (None, each.name)]
+    shown = max(known, key=lambda each: each.pose.confidence or 0.0)
     ones = {"observation": f"/observations/{shown.id}", "category": f"/categories/{shown.category_id}"}
     return {"now": "/", "categories": "/categories", "observations": "/observations", "memory": "/memory", "try": "/try"} | ones
 
@@ -111,7 +112,7 @@ def page(browser: Browser, scheme: str, size: dict[str, int], address: str) -> I
 def save(opened: Page, path: Path, *, whole: bool) -> None:
     """As a JPEG that is as wide as the page."""
     picture = cv2.imdecode(np.frombuffer(opened.screenshot(full_page=whole), np.uint8), cv2.IMREAD_COLOR)
-    cv2.imwrite(str(path), picture, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
+    cv2.imwrite(str(path), picture, [cv2.IMWRITE_JPEG_QUALITY, QUALITY, cv2.IMWRITE_JPEG_PROGRESSIVE, 1, cv2.IMWRITE_JPEG_OPTIMIZE, 1])
     sys.stdout.write(f"{path}  {path.stat().st_size / 1000:.0f} kB\n")
 
 
