@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -64,6 +65,32 @@ def test_without_a_pose_the_page_says_less(client, look, parts):
     assert "Correspondences" not in text
     assert client.get(f"/observations/{novel['id']}/scene.json").status_code == 404
     assert client.get(f"/observations/{novel['id']}/correspondences", params={"view": 0}).status_code == 404
+
+
+def test_cameras_without_depth_are_enough_for_a_page(client, ball, look, parts):
+    burst = look(world_from_object=TURNED)
+    files = parts(burst, lambda about, files: files.update(depth=[]))
+    seen = client.post("/v1/observations", files=files, params={"category_id": ball["id"]}).json()
+    assert seen["pose"] is not None, seen["pose_error"]
+    assert "Correspondences" in page(client, seen)
+    reference, target = client.get(f"/observations/{seen['id']}/scene.json").json()["clouds"]
+    assert reference["points"]
+    assert target["points"] == []
+
+
+def test_images_alone_are_enough_for_a_page(client, ball, look, parts):
+    files = [part for part in parts(look(views=2), lambda about, files: (about.clear(), files.update(depth=[]))) if part[0] != "depth"]
+    seen = client.post("/v1/observations", files=files).json()
+    assert "What is drawn" in page(client, seen)
+
+
+def test_where_to_look_next_is_told(client, ball, look, parts, monkeypatch):
+    agent = client.app.state.agent
+    seen = client.post("/v1/observations", files=parts(look(views=2)), params={"threshold": 2.0}).json()
+    found = agent.memory.observations.get(seen["id"])
+    kept = replace(found, outcome="uncertain", viewpoints=np.eye(4)[None])
+    monkeypatch.setattr(agent.memory.observations, "get", lambda observation_id: kept)
+    assert re.search(r"A look from 0\.00, 0\.00, 0\.00 m would tell most", page(client, seen))
 
 
 def test_a_deleted_category_takes_its_pictures_along(client, ball, seen):
