@@ -19,6 +19,8 @@ LEAST_VIEWS = 3
 MOST_WIDER = 2.0
 """Times the median view's extent that an object may seem wide in one view. Of 155 bursts the widest view is up to 1.7 times as wide
 where all show the object, whatever side they see, and 2.1 to 26 times where one shows what is behind or below it."""
+REACH = 0.75
+"""Of the object's extent, from its middle: where the others have it. In views that show it alone all patches are nearer."""
 LEAST_KEPT = 0.5
 """Share of such a view's patches that must be where the other views have the object; else all of it is something else."""
 
@@ -40,8 +42,8 @@ def agreeing(encoded: EncodedBurst) -> EncodedBurst:
 
 
 def _within(view: EncodedView, center: FloatArray, extent_m: float) -> EncodedView:
-    """Its patches in a sphere of twice the object's size about `center`, shape (3,); those without depth say nothing, and go."""
-    kept = np.linalg.norm(np.where(view.trusted[:, None], view.points_m, np.inf) - center, axis=1) < extent_m
+    """Its patches within REACH of `center`, shape (3,); those without depth say nothing, and go."""
+    kept = np.linalg.norm(np.where(view.trusted[:, None], view.points_m, np.inf) - center, axis=1) < REACH * extent_m
     if kept.mean() < LEAST_KEPT:
         kept[:] = False
     pooled = view.pooled if kept.any() else np.zeros_like(view.pooled)

@@ -17,8 +17,8 @@ from .conftest import PaintedObject
 
 
 def of_a_table(view: EncodedView) -> EncodedView:
-    """The same view, with patches spread over 3 m."""
-    points = np.random.default_rng(1).uniform(-1.5, 1.5, view.points_m.shape) * (1, 1, 0.01)
+    """The same view, with patches spread over a table 1 m wide: 2.5 times as wide as the object."""
+    points = np.random.default_rng(1).uniform(-0.5, 0.5, view.points_m.shape) * (1, 1, 0.01)
     return replace(view, points_m=points.astype(np.float32))
 
 
