@@ -134,6 +134,7 @@ def test_an_export_is_imported_again(tab, cup, robot, tmp_path):
         page.get_by_role("button", name="Export").click()
     file = tmp_path / "cup.zip"
     download.value.save_as(file)
+    page.wait_for_load_state("networkidle")  # else its pictures would be asked for when it is gone
     robot.forget(cup)
     page = tab.open("/memory")
     page.get_by_label("File").set_input_files(file)
