@@ -35,8 +35,6 @@ class Rendered:
 
     rgb: NDArray[np.float32]
     """sRGB, 0 to 1, shape (H, W, 3)."""
-    rays: NDArray[np.float32]
-    """Origin and direction through every pixel's centre, the direction 1 m along the optical axis, shape (H·W, 6)."""
     depth_m: NDArray[np.float32]
     """z-depth, shape (H, W); infinite where nothing is."""
     shows: NDArray[np.int64]
@@ -82,12 +80,7 @@ class LitScene:
         ahead = rays[:, 3:]
         slant = np.abs(np.einsum("ni,ni->n", hit["primitive_normals"], ahead)) / np.sqrt(np.einsum("ni,ni->n", ahead, ahead))
         rgb = _encode(linear * np.float32(EXPOSURE)).reshape(*size, 3)
-        return Rendered(rgb, rays, hit["t_hit"].reshape(size), shows, slant.reshape(size))
-
-    def hidden_from(self, points: NDArray[np.float32], eye: FloatArray) -> NDArray[np.bool_]:
-        """Whether places, shape (N, 3), cannot be seen from `eye`, shape (3,)."""
-        rays = np.concatenate([points, eye.astype(np.float32) - points], axis=1)
-        return np.asarray(self._scene.test_occlusions(o3d.core.Tensor.from_numpy(rays), tnear=4e-3, tfar=0.999).numpy())
+        return Rendered(rgb, hit["t_hit"].reshape(size), shows, slant.reshape(size))
 
     def _cast(self, rays: FloatArray) -> dict[str, NDArray[np.float32]]:
         answer = self._scene.cast_rays(o3d.core.Tensor.from_numpy(rays))

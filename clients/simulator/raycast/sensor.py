@@ -87,7 +87,7 @@ class Sensor:
         eye = Camera(config.K, true)
         ideal = scene.render(eye, config.size)
         mask = None if mask_of is None else ideal.shows == mask_of
-        measured = self._stereo(scene, eye, ideal)
+        measured = self._stereo(ideal)
         return View(
             self._colour(ideal.rgb),
             measured if measured.any() else None,
@@ -101,13 +101,13 @@ class Sensor:
         grain = self._rng.standard_normal(rgb.shape, dtype=np.float32) * np.float32(self.config.noise)
         return np.asarray(((rgb + grain) * 255).round().clip(0, 255), np.uint8)
 
-    def _stereo(self, scene: LitScene, eye: Camera, ideal: Rendered) -> NDArray[np.float32]:
+    def _stereo(self, ideal: Rendered) -> NDArray[np.float32]:
         config, shape = self.config, ideal.depth_m.shape
         near, far = config.range_m
         depth = ideal.depth_m
         seen = (depth > near) & (depth < far) & (ideal.slant > config.grazing)
         disparity = config.focal_px * config.baseline_m / np.where(seen, depth, 1.0)
-        seen &= ~self._hidden(scene, eye, ideal)
+        seen &= ~_hidden(config.focal_px * config.baseline_m / depth)
         seen &= ~self._lost(disparity, shape)
         noise = self._rng.standard_normal(shape, dtype=np.float32)
         smooth = cv2.GaussianBlur(self._rng.standard_normal(shape, dtype=np.float32), (0, 0), 2.0) * 5.0  # of about unit deviation
@@ -117,13 +117,6 @@ class Sensor:
         measured = config.focal_px * config.baseline_m / np.maximum(disparity, 1e-3)
         return np.where(seen & (measured < far), measured, 0).astype(np.float32)
 
-    def _hidden(self, scene: LitScene, eye: Camera, ideal: Rendered) -> NDArray[np.bool_]:
-        """What the second eye, to the right, does not see: the shadows beside near things."""
-        depth = np.where(np.isfinite(ideal.depth_m), ideal.depth_m, 0).reshape(-1, 1)
-        points = np.asarray(ideal.rays[:, :3] + depth * ideal.rays[:, 3:], np.float32)
-        second = eye.world_from_camera @ np.array([self.config.baseline_m, 0, 0, 1.0])
-        return scene.hidden_from(points, second[:3]).reshape(ideal.depth_m.shape)
-
     def _lost(self, disparity: FloatArray, shape: tuple[int, ...]) -> NDArray[np.bool_]:
         """Beside steps in depth, and in blotches."""
         chance = self._rng.random(shape, dtype=np.float32)
@@ -132,6 +125,19 @@ class Sensor:
         limit = np.quantile(blotch[::4, ::4], 1 - self.config.speckle) if self.config.speckle else np.inf
         blotches = cv2.resize(blotch, shape[::-1], interpolation=cv2.INTER_LINEAR) > limit
         return np.asarray((step & (chance < self.config.edge_loss)) | blotches)
+
+
+def _hidden(disparity: FloatArray) -> NDArray[np.bool_]:
+    """What the second eye, to the right, does not see, shape (H, W): the shadows beside near things.
+
+    A place is behind what lies to the right of it, in its row, and is nearer by more pixels of disparity than it is pixels away. Past a
+    thing thinner than its shadow the eye sees such a place again, but in another order than the first eye, which matching does not follow.
+    """
+    seen_at = disparity - np.arange(disparity.shape[1], dtype=np.float32)
+    nearest = np.maximum.accumulate(seen_at[:, ::-1], axis=1)[:, ::-1]
+    hidden = np.zeros(disparity.shape, dtype=bool)
+    hidden[:, :-1] = nearest[:, 1:] > seen_at[:, :-1]
+    return hidden
 
 
 def _small_motion(rng: Generator, angle_deg: float, offset_m: float) -> FloatArray:

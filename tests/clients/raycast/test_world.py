@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from clients.simulator.raycast.model import Model
-from clients.simulator.raycast.sensor import SensorConfig
+from clients.simulator.raycast.sensor import SensorConfig, _hidden
 from clients.simulator.raycast.world import UP, RaycastWorld, standing
 from core.scan import look_at
 from core.views import FloatArray, View
@@ -98,6 +98,12 @@ def test_near_things_throw_a_shadow_into_depth_on_their_left(brick: Model, small
     width = small.focal_px * small.baseline_m * (1 / 0.5 - 1 / 0.6)
     assert (row[columns[0] - 20 : columns[0]] == 0).sum() == pytest.approx(width, abs=1.5)
     assert (row[columns[-1] + 1 : columns[-1] + 21] > 0).all()
+
+
+def test_a_place_is_in_the_shadow_of_what_is_nearer_by_more_disparity_than_pixels() -> None:
+    disparity = np.full((1, 12), 2.0)
+    disparity[0, 6:] = 5.0
+    np.testing.assert_array_equal(np.flatnonzero(_hidden(disparity)[0]), [4, 5])  # at 3 the second eye just sees past the edge
 
 
 def test_dropouts_are_as_many_as_asked_for(small: SensorConfig) -> None:
