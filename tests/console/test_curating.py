@@ -142,6 +142,7 @@ def test_an_export_is_imported_again(tab, cup, robot, tmp_path):
     expect(page.get_by_text("Imported 1 category").first).to_be_visible()
     (twin,) = [each for each in robot.categories() if each.name == "cup"]
     assert twin.instances == 2
+    page.wait_for_load_state("networkidle")
     robot.forget(twin.id)
     page = tab.open("/memory")
     page.get_by_role("button", name="Undo: Deleted “cup”").last.click()
