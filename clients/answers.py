@@ -248,6 +248,8 @@ class Observation(Generic[S]):
     """Categories that an uncertain object may be of."""
     viewpoints: FloatArray | None = None
     """Of an uncertain object: world_from_camera of where to look next, most telling first, shape (n, 4, 4)."""
+    corrected_to: str | None = None
+    """The category that somebody said it was of."""
 
     def with_scan(self, make: Callable[[S], R]) -> Observation[R]:
         """The same, with what `make` makes of its scan, if it has one."""
@@ -272,6 +274,7 @@ class Observation(Generic[S]):
             candidates=tuple(fields["candidates"]),
             viewpoints=None if fields["viewpoints"] is None else np.array(fields["viewpoints"], dtype=float).reshape(-1, 4, 4),
             timings_ms=fields["timings_ms"],
+            corrected_to=fields["corrected_to"],
             raw=fields,
         )
 

@@ -56,6 +56,10 @@ def _scan(robot: AsyncRobotClient, request: ScanRequest) -> AsyncScan:
     return AsyncScan(robot, request)
 
 
+def _scans(robot: AsyncRobotClient, requests: list[ScanRequest]) -> list[AsyncScan]:
+    return [AsyncScan(robot, each) for each in requests]
+
+
 def _observation(robot: AsyncRobotClient, seen: Observation[ScanRequest]) -> Observation[AsyncScan]:
     return seen.with_scan(lambda request: AsyncScan(robot, request))
 
@@ -140,9 +144,11 @@ class AsyncRobotClient:
     observe = _method(observing.observe, _observation)
     observation = _method(observing.observation, _observation)
     observations = _method(observing.observations, _observations)
+    correct = _method(observing.correct, _observation)
     detections = _method(observing.detections, _as_is)
     picture = _method(observing.picture, _as_is)
     scan = _method(scanning.scan, _scan)
+    scans = _method(scanning.scans, _scans)
     open_scan = _method(scanning.open_scan, _scan)
     forget_scan = _method(scanning.forget_scan, _as_is)
     categories = _method(curating.categories, _as_is)

@@ -68,6 +68,10 @@ def _scan(robot: RobotClient, request: ScanRequest) -> Scan:
     return Scan(robot, request)
 
 
+def _scans(robot: RobotClient, requests: list[ScanRequest]) -> list[Scan]:
+    return [Scan(robot, each) for each in requests]
+
+
 def _observation(robot: RobotClient, seen: answers.Observation[ScanRequest]) -> Observation:
     return seen.with_scan(lambda request: Scan(robot, request))
 
@@ -156,9 +160,11 @@ class RobotClient:
     observe = _method(observing.observe, _observation)
     observation = _method(observing.observation, _observation)
     observations = _method(observing.observations, _observations)
+    correct = _method(observing.correct, _observation)
     detections = _method(observing.detections, _as_is)
     picture = _method(observing.picture, _as_is)
     scan = _method(scanning.scan, _scan)
+    scans = _method(scanning.scans, _scans)
     open_scan = _method(scanning.open_scan, _scan)
     forget_scan = _method(scanning.forget_scan, _as_is)
     categories = _method(curating.categories, _as_is)

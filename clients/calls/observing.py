@@ -80,6 +80,17 @@ def observations(
     return Call("GET", "/v1/observations", reading_list("observations", Observation.from_json), params)
 
 
+def correct(observation_id: str, category_id: str | None, name: str | None = None) -> Call[Observation[ScanRequest]]:
+    """Says what an observation was really of: its burst joins that category, and leaves the one it had joined.
+
+    Args:
+        category_id: the right category; None makes a new one of the observation's own views.
+        name: of the new category.
+    """
+    said = given(name=name) | {"category_id": category_id}
+    return Call("POST", f"/v1/observations/{observation_id}/correct", reading(Observation.from_json), body={"json": said})
+
+
 def detections(observation_id: str) -> Call[dict[str, Any]]:
     """An earlier observation in the shape of ROS 2's vision_msgs/msg/Detection3DArray, as JSON."""
     return Call("GET", f"/v1/observations/{observation_id}", reading(dict), {"format": "vision_msgs"})

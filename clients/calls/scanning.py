@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from clients.answers import Category, ScanRequest
-from clients.calls.call import Call, Direction, burst_body, burst_or_id, given, nothing, reading
+from clients.calls.call import Call, Direction, burst_body, burst_or_id, given, nothing, reading, reading_list
 from core.views import Burst
 
 
@@ -21,6 +21,11 @@ def scan(
     """
     params = given(viewpoints=viewpoints, up=None if up is None else list(up), standoff_m=standoff_m)
     return Call("POST", "/v1/scans", reading(ScanRequest.from_json), params, burst_or_id(source))
+
+
+def scans(limit: int = 50) -> Call[list[ScanRequest]]:
+    """Those in progress, the latest begun first."""
+    return Call("GET", "/v1/scans", reading_list("scans", ScanRequest.from_json), {"limit": limit})
 
 
 def open_scan(scan_id: str) -> Call[ScanRequest]:

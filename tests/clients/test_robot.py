@@ -84,6 +84,16 @@ def test_a_scan_can_be_taken_up_again_and_forgotten(robot: RobotClient, samples:
         robot.open_scan(begun.id)
 
 
+def test_an_answer_is_corrected_and_scans_in_progress_are_listed(robot: RobotClient, samples: list[Sequence]) -> None:
+    burst = load_burst(samples[0], range(2))
+    seen = robot.observe(burst)
+    assert seen.scan is not None
+    assert [scan.id for scan in robot.scans()] == [seen.scan.id]
+    corrected = robot.correct(seen.id, None, "bug")
+    assert corrected.corrected_to is not None
+    assert robot.category(corrected.corrected_to).name == "bug"
+
+
 def test_pictures_are_png(robot: RobotClient, samples: list[Sequence]) -> None:
     seen = robot.observe(load_burst(samples[0], range(2)))
     assert robot.picture(f"/v1/observations/{seen.id}/foreground.png", view=1).startswith(b"\x89PNG")
