@@ -10,7 +10,7 @@ Letters: M views, N points, C descriptor size, Q patches that are compared, P pa
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import torch
@@ -19,6 +19,7 @@ from scipy.spatial.transform import Rotation
 from torch import Tensor
 
 from core.boxes import OrientedBox, cloud_extent_m, inliers
+from core.dense import DenseConfig
 from core.descriptors import PcaBasis, unit
 from core.encode import EncodedView
 from core.errors import NoPose
@@ -44,8 +45,8 @@ class SymmetryConfig:
     """Q."""
     against: int = 1200
     """P."""
-    sigma: float = 0.06
-    """Distance at which agreement has fallen to 1/e; as `DenseConfig`'s."""
+    agreement: DenseConfig = field(default_factory=DenseConfig)
+    """Of patches after a turn; how many there are is said above."""
     place: int = 12
     """Neighbouring patches that make one place: 2.5 % of the surface, enough to see a handle."""
     least_like: float = 0.5
@@ -54,9 +55,6 @@ class SymmetryConfig:
     """An axis may be this far off the one that was looked at."""
     wander: float = 0.08
     """The same of its distance to the box's centre; as the inlier threshold of a pose."""
-    refine_sigmas: tuple[float, ...] = (0.15, 0.12, 0.12)
-    refine_power: float = 5.0
-    temperature: float = 0.15
     """Of the refinement of an axis; as `DenseConfig`'s."""
     same_axis_deg: float = 15.0
     """A box's axis this near the vertical is not looked at twice."""
@@ -108,7 +106,7 @@ class _SelfAgreement:
 
     def agreement(self, turn: FloatArray, center_m: FloatArray) -> FloatArray:
         """Of each compared patch, turned about a centre: max over other views' patches of exp(−(d/σ)²)·max(0, cosine), shape (Q,)."""
-        near = torch.cdist(self._turned(turn, center_m), self._against) / (self._config.sigma * self.extent_m)
+        near = torch.cdist(self._turned(turn, center_m), self._against) / (self._config.agreement.sigma * self.extent_m)
         return np.asarray((self._comparable(turn) - near**2).amax(dim=1).exp().numpy(), dtype=float)
 
     def sees_all(self, agreement: FloatArray) -> bool:
@@ -122,7 +120,7 @@ class _SelfAgreement:
 
     def refine(self, turn: FloatArray, center_m: FloatArray) -> Sim3:
         """Rounds of weighted least squares on soft matches; a rigid motion of the world. Raises NoPose where they determine none."""
-        config, motion = self._config, Sim3(1.0, turn, center_m - turn @ center_m)
+        config, motion = self._config.agreement, Sim3(1.0, turn, center_m - turn @ center_m)
         comparable = config.refine_power * self._comparable(turn)
         for sigma in config.refine_sigmas:
             placed = torch.from_numpy(motion.apply(self._points)).float()

@@ -8,9 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-import torch
-
 from core.backbones.whitening import Whitening
 from core.dense import DenseAgreement, DenseConfig
 from core.descriptors import unit
@@ -32,13 +29,7 @@ def agreement(reference: Reference, target: EncodedBurst, target_from_reference:
     sides = [[view.trusted_only() for view in views] for views in (reference.views, target.views)]
     described = [_describe(views, whitening) for views in sides]
     dense = DenseAgreement(sides[0], sides[1], (described[0], described[1]), DENSE, seed=0)
-    pose = target_from_reference
-    batch = Sim3Batch(
-        torch.tensor([pose.scale]).float(),
-        torch.from_numpy(pose.rotation)[None].float(),
-        torch.from_numpy(np.asarray(pose.translation))[None].float(),
-    )
-    return float(dense.score(batch)[0])
+    return float(dense.score(Sim3Batch.of([target_from_reference]))[0])
 
 
 def _describe(views: Sequence[EncodedView], whitening: Whitening | None) -> list[FloatArray]:

@@ -29,7 +29,7 @@ from service.scanning import Scanning
 from service.upkeep import Upkeep
 from store.memory import Memory
 from store.observations import Answer, Joins
-from store.records import Alternative, Observation, Pose
+from store.records import Observation, Pose
 
 
 @dataclass(frozen=True)
@@ -203,7 +203,7 @@ def _pose_record(estimate: PoseEstimate, reference: Reference, burst: Burst) -> 
         estimate.residual_m,
         estimate.score,
         estimate.confidence,
-        tuple(Alternative(each.target_from_reference, each.score, each.confidence) for each in estimate.alternatives),
+        estimate.alternatives,
         tuple(_box_px(box, view) for view in burst.views),
         estimate.target_from_object,
         estimate.not_9d_because,

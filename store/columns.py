@@ -15,12 +15,13 @@ from numpy.typing import NDArray
 from core.affine9 import Affine9
 from core.boxes import OrientedBox
 from core.grounds import Grounds
+from core.matches import Alternative
 from core.novelty import Decision
 from core.quality import ViewFault
 from core.scan import ScanRequest
 from core.sim3 import Sim3
 from store.folders import Files, FileSum
-from store.records import Alternative, Pose
+from store.records import Pose
 
 AFFINE9 = ("scales", "rotation", "translation")
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from core.affine9 import Affine9
 from core.boxes import OrientedBox
 from core.grounds import Grounds
+from core.matches import Alternative
 from core.novelty import Decision
 from core.scan import ScanRequest
 from core.sim3 import Sim3
@@ -124,15 +125,6 @@ class Scan:
     """The category the completed scan made."""
     expires_at: str
     """When it ends unless more views come before."""
-
-
-@dataclass(frozen=True, eq=False)
-class Alternative:
-    """Another transform that was considered for an object."""
-
-    target_from_reference: Sim3
-    score: float
-    confidence: float | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
 import torch
 from torch import Tensor
 
@@ -50,6 +51,14 @@ class Sim3Batch:
 
     def __getitem__(self, index: int) -> Sim3:
         return Sim3(float(self.scale[index]), self.rotation[index].double().numpy(), self.translation[index].double().numpy())
+
+    @staticmethod
+    def of(transforms: Sequence[Sim3]) -> Sim3Batch:
+        """The transforms, in single precision."""
+        rotation = np.stack([each.rotation for each in transforms])
+        translation = np.stack([each.translation for each in transforms])
+        scale = torch.tensor([each.scale for each in transforms]).float()
+        return Sim3Batch(scale, torch.from_numpy(rotation).float(), torch.from_numpy(translation).float())
 
     @staticmethod
     def concatenate(batches: Sequence[Sim3Batch]) -> Sim3Batch:

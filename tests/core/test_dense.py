@@ -24,11 +24,7 @@ from .conftest import PaintedObject
 
 
 def batch(*transforms: Sim3) -> Sim3Batch:
-    return Sim3Batch(
-        torch.tensor([each.scale for each in transforms]).float(),
-        torch.from_numpy(np.stack([each.rotation for each in transforms])).float(),
-        torch.from_numpy(np.stack([each.translation for each in transforms])).float(),
-    )
+    return Sim3Batch.of(transforms)
 
 
 def turned(degrees: float) -> Sim3:

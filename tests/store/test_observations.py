@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 from core.boxes import OrientedBox
 from core.encode import EncodedBurst
 from core.errors import Conflict, NotFound
+from core.matches import Alternative
 from core.novelty import Decision
 from core.reference import Reference
 from core.scan import ScanRequest
@@ -18,7 +19,7 @@ from core.sim3 import Sim3
 from core.views import Burst
 from store.memory import Memory
 from store.observations import Answer
-from store.records import Alternative, Pose
+from store.records import Pose
 
 FEATURES = {"a": np.arange(3)}
 NOVEL = Answer("novel", None, "map", Decision("novel", "paper_mean", 0.4, (("x", 0.1),)), None, None, None, {"total": 12.5})
