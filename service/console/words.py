@@ -24,8 +24,10 @@ def metres(value: float) -> str:
 
 
 def percent(share: float) -> str:
-    """87 %."""
-    return f"{100 * share:.0f} %"
+    """87 %; nearly all and nearly nothing are not rounded to certainty."""
+    if 0 < share < 0.005:
+        return "< 1 %"
+    return "> 99 %" if 0.995 <= share < 1 else f"{100 * share:.0f} %"
 
 
 def short_id(identifier: str) -> str:
