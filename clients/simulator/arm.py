@@ -76,6 +76,11 @@ class Arm:
         """How far off each view was from what was asked: the angle between both directions about the object."""
         self._at: FloatArray | None = None
 
+    @property
+    def at(self) -> FloatArray | None:
+        """Where the camera is, world_from_camera of shape (4, 4); None before the first look."""
+        return self._at
+
     def cannot_reach(self, world_from_camera: FloatArray) -> str | None:
         """Why the camera cannot be at a pose, shape (4, 4); None where it can."""
         limits = self.config.limits

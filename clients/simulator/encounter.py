@@ -12,6 +12,7 @@ import numpy as np
 
 from clients.pose_error import PoseError
 from clients.robot import Observation
+from clients.simulator.waypoints import Waypoint
 from clients.simulator.world import WorldObject
 from core.sim3 import Sim3
 
@@ -107,6 +108,9 @@ class Encounter:
     timings_ms: Mapping[str, float]
     """Milliseconds of each stage in the service, and their `total`."""
     robot: int = 0
+    waypoints: tuple[Waypoint, ...] = ()
+    """Of an object taken for known: the pose at each, from the view there alone."""
+    waypoints_out_of_reach: int = 0
 
     def as_json(self) -> str:
         """One line."""
@@ -124,6 +128,7 @@ class Encounter:
                 "error": PoseError(**error) if error else None,
                 "offsets_deg": tuple(fields["offsets_deg"]),
                 "view_faults": tuple(fields["view_faults"]),
+                "waypoints": tuple(Waypoint.from_plain(each) for each in fields["waypoints"]),
             }
         )
 

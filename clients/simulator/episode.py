@@ -18,6 +18,7 @@ from clients.robot import Observation, RobotClient
 from clients.simulator.arm import FREE, Arm, ArmConfig
 from clients.simulator.encounter import Encounter, Founder, Verdict, best_view, judge
 from clients.simulator.scanning import COULD_NOT, ScanReport, carry_out
+from clients.simulator.waypoints import Visit, visit_waypoints
 from clients.simulator.world import Subject, WorldObject
 from core.views import Burst
 
@@ -59,6 +60,8 @@ class Conduct:
     arm: ArmConfig = FREE
     lost_views: float = 0.0
     """Share of views that never arrive: a fault to be lived with."""
+    waypoints: int = 0
+    """From which an object taken for known is looked at once more, each view by itself."""
 
 
 class Episode:
@@ -115,6 +118,18 @@ class Episode:
             scan_ms = (time.perf_counter() - started) * 1e3
         if learnt is not None:
             self._truth.add(learnt.id, Founder.of(thing))
+        recognised = verdict is Verdict.RECOGNISED
+        visit = Visit()
+        if seen.outcome == "known" and self._conduct.waypoints:
+            visit = visit_waypoints(
+                self._robot,
+                arm,
+                seen,
+                burst,
+                self._conduct.waypoints,
+                chance.randrange(1 << 16),
+                lambda answer: _error(answer, founder, thing) if recognised else None,
+            )
         most_similar = seen.similarities[0] if seen.similarities else None
         nearest = self._truth.founder(most_similar.category_id) if most_similar else None
         return Encounter(
@@ -131,7 +146,7 @@ class Episode:
             threshold=seen.threshold,
             in_memory=in_memory,
             has_truth=thing.world_from_model is not None,
-            error=_error(seen, founder, thing) if verdict is Verdict.RECOGNISED else None,
+            error=_error(seen, founder, thing) if recognised else None,
             learnt=learnt.id if learnt else None,
             learnt_views=learnt.views if learnt else 0,
             founder_matrix=thing.world_from_model.as_matrix().tolist() if learnt and thing.world_from_model else None,
@@ -147,6 +162,8 @@ class Episode:
             motion_s=arm.clock_s,
             timings_ms=dict(seen.timings_ms),
             robot=self._number,
+            waypoints=visit.waypoints,
+            waypoints_out_of_reach=visit.out_of_reach,
         )
 
     def _without_lost(self, burst: Burst, chance: random.Random) -> Burst:

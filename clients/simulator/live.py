@@ -9,7 +9,7 @@ from rich.table import Table
 from rich.text import Text
 
 from clients.simulator.encounter import Encounter, Verdict
-from clients.simulator.summary import ACC_DEG, Summary
+from clients.simulator.summary import ACC_DEG, Spread, Summary
 from clients.simulator.teacher import Lesson, TeachingSummary
 
 STAGES = {"find": "find", "features": "features", "points": "features", "decide": "decide"}
@@ -111,12 +111,30 @@ def summary_rows(summary: Summary) -> list[tuple[str, str, str]]:
             rows.append((f"Acc{limit:g}", f"{value:.0f} %", f"of the recognised are at most {limit:g}° from the truth"))
     if summary.median_deg is not None:
         rows.append(("median rotation error", f"{summary.median_deg:.1f}°", ""))
+    if summary.waypoints is not None:
+        rows.extend(_waypoint_rows(summary.waypoints))
     rows.append(("time to an answer", f"{summary.observe_ms / 1e3:.1f} s", "median"))
     if summary.scan_ms is not None:
         rows.append(("time to a category", f"{summary.scan_ms / 1e3:.1f} s", "median, from the scan's first view"))
     if summary.motion_s:
         rows.append(("arm in motion", f"{summary.motion_s / 60:.1f} min", f"simulated; {summary.refused} viewpoints were out of reach"))
     rows.append(("whole episode", f"{summary.total_s:.0f} s", ""))
+    return rows
+
+
+def _waypoint_rows(spread: Spread) -> list[tuple[str, str, str]]:
+    rows = [
+        (
+            "waypoints",
+            str(spread.visited),
+            f"of one view each; {spread.without_pose} gave no pose, {spread.out_of_reach} more were out of reach",
+        )
+    ]
+    if spread.median_deg is not None:
+        rows.append(("rotation there", f"{spread.median_deg:.1f}°", f"median error; {spread.worst_deg:.1f}° the worst"))
+    if spread.median_translation is not None and spread.worst_translation is not None:
+        worst = f"{100 * spread.worst_translation:.0f} % the worst"
+        rows.append(("centre there", f"{100 * spread.median_translation:.0f} %", f"of the diagonal off, median; {worst}"))
     return rows
 
 

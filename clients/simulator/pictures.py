@@ -36,17 +36,19 @@ class Pictures:
     correspondences: str | None
     scanned: str | None
     """The views that a category was learnt from."""
+    waypoints: tuple[str | None, ...]
+    """Of each waypoint the view there, with the box where it has a pose."""
 
 
 def fetch_pictures(robot: RobotClient, encounter: Encounter) -> Pictures:
     """All pictures that the service has of an encounter."""
     view = encounter.best_view
 
-    def fetch(name: str, side: int | None = None, **which: int) -> str | None:
-        if not encounter.observation_id:
+    def fetch(name: str, side: int | None = None, *, of: str = encounter.observation_id, **which: int) -> str | None:
+        if not of:
             return None
         try:
-            return data_uri(robot.picture(f"/v1/observations/{encounter.observation_id}/{name}.png", **which), side)
+            return data_uri(robot.picture(f"/v1/observations/{of}/{name}.png", **which), side)
         except NotFoundProblem:
             return None
 
@@ -58,6 +60,7 @@ def fetch_pictures(robot: RobotClient, encounter: Encounter) -> Pictures:
         overlay=fetch("overlay", CROP_SIDE, view=view),
         correspondences=fetch("correspondences", view=view),
         scanned=_scanned(robot, encounter),
+        waypoints=tuple(fetch("overlay", CROP_SIDE, of=each.observation_id, view=0) for each in encounter.waypoints),
     )
 
 

@@ -55,6 +55,8 @@ class Script:
     """`random`, or `grouped`: one category after the other."""
     views: int = 8
     """In the burst of each encounter."""
+    waypoints: int = 0
+    """Random ones from which an object taken for known is looked at once more, each view by itself."""
     seed: int = 0
     robots: int = 1
     """That share the memory, each in a world of its own."""
@@ -65,7 +67,7 @@ class Script:
     def conduct(self) -> Conduct:
         """How robots go about it: on an arm in the rendered world, anywhere in a recording."""
         arm = ArmConfig() if self.world == "raycast" else FREE
-        return Conduct(self.views, self.seed, arm, self.faults.lost_views)
+        return Conduct(self.views, self.seed, arm, self.faults.lost_views, self.waypoints)
 
     def subjects(self, robot: int = 0) -> list[Subject]:
         """What a robot meets, in order."""
@@ -144,6 +146,10 @@ def check(script: Script) -> Script:
         number = getattr(script, name)
         if number is not None and number < 1:
             raise InvalidInput(name, f"expected 1 or more, found {number}")
+    if script.waypoints < 0:
+        raise InvalidInput("waypoints", f"expected 0 or more, found {script.waypoints}")
+    if script.waypoints and script.teacher:
+        raise InvalidInput("waypoints", "are not visited where a teacher asks: leave them or the teacher out")
     if not 0 <= script.faults.lost_views < 1:
         raise InvalidInput("faults.lost_views", f"expected a share from 0 to below 1, found {script.faults.lost_views}")
     if script.world != "raycast" and (script.meshes or script.faults.sensor):

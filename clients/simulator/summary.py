@@ -15,6 +15,22 @@ ACC_DEG = (30.0, 15.0, 7.5)
 
 
 @dataclass(frozen=True)
+class Spread:
+    """How steady the poses of single views from waypoints are; errors are those of rightly recognised objects with ground truth."""
+
+    visited: int
+    out_of_reach: int
+    without_pose: int
+    """Of those visited."""
+    median_deg: float | None
+    """Rotation error; None where no pose could be compared with the truth."""
+    worst_deg: float | None
+    median_translation: float | None
+    """Over the object's diagonal."""
+    worst_translation: float | None
+
+
+@dataclass(frozen=True)
 class Summary:
     """See module."""
 
@@ -46,6 +62,8 @@ class Summary:
     motion_s: float
     """Simulated time that arms moved, all together."""
     total_s: float
+    waypoints: Spread | None = None
+    """None where no object was looked at from any."""
     disagreements: tuple[str, ...] = ()
     """Where the memory is not what the encounters made of it, in words."""
 
@@ -86,6 +104,25 @@ def summarise(encounters: Sequence[Encounter], total_s: float) -> Summary:
         refused=sum(each.refused for each in encounters),
         motion_s=sum(each.motion_s for each in encounters),
         total_s=total_s,
+        waypoints=spread(encounters),
+    )
+
+
+def spread(encounters: Sequence[Encounter]) -> Spread | None:
+    """Over the waypoints of all encounters; None where there were none."""
+    visited = [waypoint for each in encounters for waypoint in each.waypoints]
+    out_of_reach = sum(each.waypoints_out_of_reach for each in encounters)
+    if not visited and not out_of_reach:
+        return None
+    errors = [each.error for each in visited if each.error is not None]
+    return Spread(
+        visited=len(visited),
+        out_of_reach=out_of_reach,
+        without_pose=sum(each.target_from_reference is None for each in visited),
+        median_deg=median(errors, "rotation_deg") if errors else None,
+        worst_deg=max(each.rotation_deg for each in errors) if errors else None,
+        median_translation=median(errors, "translation") if errors else None,
+        worst_translation=max(each.translation for each in errors) if errors else None,
     )
 
 
