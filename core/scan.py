@@ -175,6 +175,7 @@ def waypoints(
         center_m: what they look at, in the world frame, shape (3,).
         up: away from the support, unit vector, shape (3,).
         radius_m: distance of each from the centre.
+        count: at least 1.
         seed: of where they are; which are drawn does not depend on where the camera is.
         world_from_camera: the camera's present pose, shape (4, 4), from which the way starts; from the first one drawn where left out.
     """

@@ -47,6 +47,8 @@ def test_recordings_are_played_by_category() -> None:
         ({"world": "moon"}, "world"),
         ({"views": 0}, "views"),
         ({"views": "many"}, "views"),
+        ({"waypoints": -1}, "waypoints"),
+        ({"waypoints": 2, "teacher": True}, "waypoints"),
         ({"views": True}, "views"),
         ({"teacher": 1}, "teacher"),
         ({"categories": 3}, "categories"),
