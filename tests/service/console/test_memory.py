@@ -62,8 +62,11 @@ def test_a_backup_says_where_it_is(client, learn, settings):
     assert f"Backed up the memory to {folder}" in page.text
 
 
-def test_chosen_categories_are_exported_and_come_back(client, learn):
-    cup, mug = learn("bright", "cup")["id"], learn("dark", "mug")["id"]
+def test_chosen_categories_are_exported_and_come_back(client, learn, look, parts):
+    cup = learn("bright", "cup")["id"]
+    scan = client.post("/v1/scans", files=parts(look("dark"))).json()["id"]
+    client.post(f"/v1/scans/{scan}/views", files=parts(look("dark")))
+    mug = client.post(f"/v1/scans/{scan}/complete", json={"name": "mug"}).json()["id"]
     answer = client.post("/memory/export", data={"category": [cup]})
     assert answer.headers["content-type"] == "application/zip"
     client.delete(f"/v1/categories/{cup}")
