@@ -18,10 +18,9 @@ from numpy.typing import NDArray
 from rich.progress import track
 
 from benchmarks.agreements import agreements
-from benchmarks.encoded import encode_all, read_encoded
+from benchmarks.encoded import encode_all, read_views
 from benchmarks.matches import matches
 from clients.datasets.folders import find_sequences
-from core.agreement import agreeing
 from core.backbones.dino import load_backbone
 from core.calibration import SHIPPED
 from core.encode import Encoder
@@ -35,7 +34,7 @@ def main(data: Annotated[Path, typer.Option(help="folder of bursts")], out: Anno
     backbone = load_backbone(report=typer.echo)
     sequences = find_sequences(data)
     files = encode_all(sequences, Encoder(backbone))
-    bursts = [agreeing(read_encoded(file)) for file in track(files, "reading")]
+    bursts = [read_views(file) for file in track(files, "reading")]
     labels = np.unique([sequence.category for sequence in sequences], return_inverse=True)[1]
     typer.echo(f"wrote {write(out, labels, matches(bursts, backbone.whitening)[0], agreements(files, backbone.whitening))}")
 

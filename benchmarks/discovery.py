@@ -21,14 +21,13 @@ from benchmarks import calibrated
 from benchmarks.agreements import agreements
 from benchmarks.best_pairs import BestPairs, BestSource
 from benchmarks.discovery_plot import plot
-from benchmarks.encoded import encode_all, read_encoded
+from benchmarks.encoded import encode_all, read_views
 from benchmarks.episodes import Counts, SetSource, draw_orders, episode
 from benchmarks.matches import matches
 from benchmarks.pair_scores import PARTS, FloatArray, PairScores, auroc
 from benchmarks.parallel import map_jobs
 from benchmarks.tables import Row, print_table, write_json
 from clients.datasets.sources import find_sequences
-from core.agreement import agreeing
 from core.backbones.dino import load_backbone
 from core.calibration import Calibration, Prior
 from core.encode import Encoder
@@ -103,7 +102,7 @@ def run(
         raise InvalidInput("data", "discovery needs two categories, and two objects of one of them")
     network = load_backbone(backbone)
     files = encode_all(sequences, Encoder(network))
-    bursts = [agreeing(read_encoded(file)) for file in files]
+    bursts = [read_views(file) for file in files]
     tables: dict[str, PairScores | BestPairs] = {score: PairScores.of(bursts, score) for score in PARTS if score in (scores or PARTS)}
     if not scores or BEST in scores:
         agreement = agreements(files, network.whitening) if poses else None

@@ -47,6 +47,7 @@ def encode_all(sequences: Sequence[folders.Sequence], encoder: Encoder, folder: 
     return files
 
 
+@lru_cache(maxsize=16)
 def read_encoded(file: Path) -> EncodedBurst:
     """What `encode_all` kept in `file`."""
     with np.load(file, allow_pickle=False) as arrays:
@@ -54,12 +55,10 @@ def read_encoded(file: Path) -> EncodedBurst:
         return replace(burst_from_arrays(arrays), stage_ms=stage_ms)
 
 
-def read_views(file: Path, indices: list[int]) -> EncodedBurst:
-    """The views at `indices` alone, as the service would have them of a robot that sent no others."""
-    return agreeing(_cached(file).select(indices))
-
-
-_cached = lru_cache(maxsize=16)(read_encoded)
+def read_views(file: Path, indices: list[int] | None = None) -> EncodedBurst:
+    """The views at `indices`, all where None, as the service would have them of a robot that sent no others."""
+    whole = read_encoded(file)
+    return agreeing(whole if indices is None else whole.select(indices))
 
 
 def _key(sequence: folders.Sequence, encoder: Encoder) -> str:

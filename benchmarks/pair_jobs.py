@@ -8,6 +8,7 @@ from pathlib import Path
 
 from benchmarks.encoded import encode_all, read_views
 from benchmarks.pairs import Pair, ViewCounts, choose_views, sample_pairs
+from clients.datasets.folders import Sequence as Recording
 from clients.datasets.sources import find_sequences
 from clients.pose_error import rotation_error_deg
 from core.encode import EncodedBurst, Encoder
@@ -42,8 +43,7 @@ class PairJob:
         return [rotation_error_deg(each.rotation, of_reference, of_target, self.pair[1].symmetries) for each in transforms]
 
     def _seen(self, side: int, role: str, count: int | None) -> EncodedBurst:
-        sequence = self.pair[side]
-        return read_views(self.files[side], choose_views(sequence.name, role, len(sequence.images), count, self.seed))
+        return seen_views(self.pair[side], self.files[side], role, count, self.seed)
 
 
 def pair_jobs(data: Path | str, views: Sequence[str], limit: int, seed: int, encoder: Encoder) -> list[PairJob]:
@@ -53,6 +53,16 @@ def pair_jobs(data: Path | str, views: Sequence[str], limit: int, seed: int, enc
     """
     counts = [ViewCounts.parse(text) for text in views]
     pairs = sample_pairs(find_sequences(data), limit, seed)
-    sequences = list(dict.fromkeys(sequence for pair in pairs for sequence in pair))
-    files = dict(zip((sequence.key for sequence in sequences), encode_all(sequences, encoder), strict=True))
+    files = encode_pairs(pairs, encoder)
     return [PairJob((a, b), (files[a.key], files[b.key]), count, seed) for count in counts for a, b in pairs]
+
+
+def encode_pairs(pairs: Sequence[Pair], encoder: Encoder) -> dict[str, Path]:
+    """The encoded views of each sequence of the pairs, by its key."""
+    sequences = list(dict.fromkeys(sequence for pair in pairs for sequence in pair))
+    return {sequence.key: file for sequence, file in zip(sequences, encode_all(sequences, encoder), strict=True)}
+
+
+def seen_views(sequence: Recording, file: Path, role: str, count: int | None, seed: int) -> EncodedBurst:
+    """The views that stand for a sequence as `reference` or `target`."""
+    return read_views(file, choose_views(sequence.name, role, len(sequence.images), count, seed))

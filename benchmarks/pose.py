@@ -18,14 +18,14 @@ import numpy as np
 
 from benchmarks.box_iou import Parallelepiped, box_iou
 from benchmarks.contenders import Found, Setting, Sweep
-from benchmarks.encoded import encode_all, read_encoded, read_views
-from benchmarks.pairs import Pair, ViewCounts, choose_views, sample_pairs
+from benchmarks.encoded import read_views
+from benchmarks.pair_jobs import encode_pairs, seen_views
+from benchmarks.pairs import Pair, ViewCounts, sample_pairs
 from benchmarks.parallel import map_jobs, worker_count
 from benchmarks.tables import print_table, write_json
 from clients.datasets import folders
 from clients.datasets.sources import find_sequences
 from clients.pose_error import NO_POSE, PoseError, accuracy, median, pose_error, rotation_error_deg
-from core.agreement import agreeing
 from core.backbones.dino import load_backbone
 from core.boxes import remove_outliers
 from core.encode import EncodedBurst, Encoder
@@ -134,10 +134,8 @@ def measure(data: Path, sweeps: Sequence[Sweep], limit: int | None, seed: int, b
     network = load_backbone(backbone)
     settings = [setting for sweep in sweeps for setting in sweep.settings(network.dim)]
     pairs = sample_pairs(find_sequences(data), DEFAULT_LIMIT if limit is None else limit, seed)
-    sequences = list(dict.fromkeys(sequence for pair in pairs for sequence in pair))
-    _require_views(sequences, [setting.views for setting in settings])
-    encoded = encode_all(sequences, Encoder(network))
-    files = {sequence.key: file for sequence, file in zip(sequences, encoded, strict=True)}
+    _require_views([sequence for pair in pairs for sequence in pair], [setting.views for setting in settings])
+    files = encode_pairs(pairs, Encoder(network))
     by_setting = [_jobs(setting, pairs, files, seed) for setting in settings]
     jobs = [job for jobs_of_reference in zip(*by_setting) for job in jobs_of_reference]  # what one has read serves the next
     started = time.perf_counter()
@@ -246,8 +244,7 @@ def _jobs(setting: Setting, pairs: Sequence[Pair], files: dict[str, Path], seed:
 
 
 def _select(job: Job, sequence: folders.Sequence, role: str, count: int | None) -> EncodedBurst:
-    indices = choose_views(sequence.name, role, len(sequence.images), count, job.seed)
-    return read_views(job.files[sequence.key], indices)
+    return seen_views(sequence, job.files[sequence.key], role, count, job.seed)
 
 
 def _score(found: Found | None, job: Job, sequence: folders.Sequence) -> tuple[PoseError, float, int]:
@@ -275,4 +272,4 @@ def _model_box(job: Job, sequence: folders.Sequence, world_from_model: Sim3) -> 
 @lru_cache(maxsize=16)
 def _measured(file: Path) -> FloatArray:
     """The cloud of all views without outliers."""
-    return remove_outliers(agreeing(read_encoded(file)).cloud_m)
+    return remove_outliers(read_views(file).cloud_m)

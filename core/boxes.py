@@ -33,6 +33,14 @@ class OrientedBox:
         signs = np.array([[(b >> axis & 1) - 0.5 for axis in range(3)] for b in range(8)])
         return signs * self.extent_m @ self.world_from_object[:3, :3].T + self.world_from_object[:3, 3]
 
+    def in_object(self, points_m: FloatArray) -> FloatArray:
+        """World points, shape (N, 3), in the object frame."""
+        return np.asarray((points_m - self.world_from_object[:3, 3]) @ self.world_from_object[:3, :3])
+
+    def holds(self, points_m: FloatArray, times: float = 1.0) -> NDArray[np.bool_]:
+        """Which world points, shape (N, 3), are within `times` its size, shape (N,)."""
+        return np.asarray((np.abs(self.in_object(points_m)) <= times * self.extent_m / 2).all(axis=1))
+
     def moved_by(self, target_from_reference: Sim3) -> OrientedBox:
         """The box on the target: its frame stays rigid, the scale goes into the extent."""
         moved = np.eye(4)

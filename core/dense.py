@@ -7,9 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
 from core.affine9 import Affine9, fit_affine9
@@ -56,19 +58,29 @@ class DenseAgreement:
     ) -> None:
         """From views with trusted patches only, and the unit descriptors of those patches, one array a view."""
         self.config = config
-        self._reference, of_reference, self._faces_reference = _draw(reference, descriptors[0], config.points, seed)
-        self._target, of_target, self._faces_target = _draw(target, descriptors[1], config.points, seed + 1)
+        self._drawn = (reference, _draw(reference, config.points, seed)), (target, _draw(target, config.points, seed + 1))
+        self._reference, self._target = (_as_tensor(_points(views)[drawn]) for views, drawn in self._drawn)
+        of_reference, of_target = (
+            _as_tensor(np.concatenate(described)[drawn]) for described, (_, drawn) in zip(descriptors, self._drawn, strict=True)
+        )
         self.extent_m = cloud_extent_m(self._target.numpy())
         self._log_cosine = (of_reference @ of_target.T).clamp_min(1e-4).log()
+
+    @cached_property
+    def _faces(self) -> tuple[Tensor, Tensor]:
+        """Where the drawn points of the reference and of the target face, shapes (N, 3) and (Q, 3); refinement does not ask."""
+        of_reference, of_target = (_as_tensor(outward_normals(views)[drawn]) for views, drawn in self._drawn)
+        return of_reference, of_target
 
     def score(self, transforms: Sim3Batch) -> Tensor:
         """Agreement in [0, 1], shape (T,): mean over points of max over the other object of exp(−(d/σ)²)·max(0, cosine),
         geometric mean of both directions. Surfaces that face opposite ways do not agree, however near: a thin thing face down does
         not lie on one face up."""
+        faces_reference, faces_target = self._faces
         parts = []
         for start in range(0, len(transforms), BATCH):
             batch = transforms.select(range(start, min(start + BATCH, len(transforms))))
-            facing = self._faces_reference @ batch.rotation.transpose(1, 2) @ self._faces_target.T
+            facing = faces_reference @ batch.rotation.transpose(1, 2) @ faces_target.T
             log = self._log_agreement(batch.apply(self._reference), self.config.sigma, 1.0).masked_fill_(facing < OPPOSITE, -torch.inf)
             parts.append((log.amax(dim=2).exp().mean(dim=1) * log.amax(dim=1).exp().mean(dim=1)).sqrt())
         return torch.cat(parts)
@@ -109,11 +121,14 @@ class DenseAgreement:
         return power * self._log_cosine - (distance / (sigma * self.extent_m)) ** 2
 
 
-def _draw(views: Sequence[EncodedView], descriptors: Sequence[FloatArray], count: int, seed: int) -> tuple[Tensor, Tensor, Tensor]:
-    """Random points without outliers, shape (N, 3), their descriptors, shape (N, C), and where they face, shape (N, 3)."""
-    points = np.concatenate([view.points_m for view in views])
-    kept = np.random.default_rng(seed).permutation(inliers(points))[:count]
-    drawn, described, faces = (
-        torch.from_numpy(each[kept]).float() for each in (points, np.concatenate(descriptors), outward_normals(views))
-    )
-    return drawn, described, faces
+def _points(views: Sequence[EncodedView]) -> FloatArray:
+    return np.concatenate([view.points_m for view in views])
+
+
+def _draw(views: Sequence[EncodedView], count: int, seed: int) -> NDArray[np.intp]:
+    """Indices of up to `count` random points without outliers, shape (N,)."""
+    return np.random.default_rng(seed).permutation(inliers(_points(views)))[:count]
+
+
+def _as_tensor(values: FloatArray) -> Tensor:
+    return torch.from_numpy(values).float()

@@ -55,7 +55,6 @@ class SymmetryConfig:
     """An axis may be this far off the one that was looked at."""
     wander: float = 0.08
     """The same of its distance to the box's centre; as the inlier threshold of a pose."""
-    """Of the refinement of an axis; as `DenseConfig`'s."""
     same_axis_deg: float = 15.0
     """A box's axis this near the vertical is not looked at twice."""
 

@@ -79,12 +79,16 @@ class Upkeep:
 
     def thresholds(self) -> Thresholds:
         """As they are now."""
-        tokens, verified = (self.distribution(kind) for kind in (False, True))
+        tokens, verified = self.distributions()
         return Thresholds(self.false_known_rate, tokens.known_above, verified.known_above, len(tokens.rivals) + len(verified.rivals))
 
-    def distribution(self, verified: bool) -> Distribution:
-        """What a threshold of the score `best` rests on: with poses, or from tokens alone."""
-        past = [each for each in self._memory.observations.decisions(CALIBRATED_BY) if each.score == BEST and each.verified is verified]
+    def distributions(self) -> tuple[Distribution, Distribution]:
+        """What the thresholds of the score `best` rest on: from tokens alone, and with poses."""
+        past = [each for each in self._memory.observations.decisions(CALIBRATED_BY) if each.score == BEST]
+        return self._distribution(past, verified=False), self._distribution(past, verified=True)
+
+    def _distribution(self, decisions: Sequence[Decision], *, verified: bool) -> Distribution:
+        past = [each for each in decisions if each.verified is verified]
         rivals = tuple(each.rival for each in past if each.rival is not None)
         calibration = Calibration.fit(rivals, Prior.shipped().of(verified))
         known, uncertain, learn = (

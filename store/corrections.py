@@ -12,7 +12,7 @@ from store.audit import record
 from store.categories import insert_category, reference_files
 from store.connection import Connection, Row, new_id
 from store.folders import Files
-from store.instances import LIVING, insert_instance
+from store.instances import LIVING, insert_instance, is_empty
 from store.observations import require_living
 from store.records import AuditEntry
 
@@ -67,17 +67,12 @@ def _correct(db: Database, observation_id: str, category_id: str, encoded: Encod
             raise Conflict(f"observation {observation_id!r} is one of category {category_id!r} already")
         update = "UPDATE instances SET category_id = ?, how = 'named', similarity = NULL WHERE id = ?"
         db.execute(update, [category_id, instance_id])
-        _require_one(db, assigned["category_id"])
+        if is_empty(db, assigned["category_id"]):
+            raise Conflict(f"the burst is the last of category {assigned['category_id']!r}; merge or delete that category instead")
     db.execute("UPDATE observations SET corrected_to = ? WHERE id = ?", [category_id, observation_id])
     before = {"assigned": assigned, "corrected_to": said}
     after = {"observation": observation_id, "category": category_id, "instance": instance_id, "made": made}
     record(db, "correct", category_id, before, after, actor)
-
-
-def _require_one(db: Database, category_id: str) -> None:
-    (left,) = db.execute("SELECT count(*) FROM instances WHERE category_id = ? AND removed_by IS NULL", [category_id]).fetchone()
-    if not left:
-        raise Conflict(f"the burst is the last of category {category_id!r}; merge or delete that category instead")
 
 
 def undo_correction(db: Database, entry: AuditEntry, undo_id: str) -> bool:

@@ -67,8 +67,7 @@ class Instances:
         with self._connection.change() as db:
             entry_id = record(db, "forget", category_id, {"instance": instance_id}, {}, actor)
             db.execute("UPDATE instances SET removed_by = ? WHERE id = ? AND removed_by IS NULL", [entry_id, instance_id])
-            (left,) = db.execute("SELECT count(*) FROM instances WHERE category_id = ? AND removed_by IS NULL", [category_id]).fetchone()
-            if not left:
+            if is_empty(db, category_id):
                 raise Conflict(f"instance {instance_id!r} is the last of category {category_id!r}; delete the category instead")
 
     def members(self) -> list[Member]:
@@ -117,6 +116,12 @@ def token_columns(encoded: EncodedBurst) -> Row:
         "patches": patches_to_blob(sample_patches(encoded)),
     }
     return row | {"views": len(encoded.cls), "tokens_sha256": tokens_sha256(row)}
+
+
+def is_empty(db: Database, category_id: str) -> bool:
+    """Whether no burst is left in a category."""
+    (left,) = db.execute("SELECT count(*) FROM instances WHERE category_id = ? AND removed_by IS NULL", [category_id]).fetchone()
+    return not left
 
 
 def insert_instance(

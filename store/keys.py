@@ -58,14 +58,14 @@ class Keys:
         with self._connection.change() as db:
             if any(each.name == name for each in self.all()):
                 raise Conflict(f"a key is called {name!r} already; revoke it first (onelook keys list), or give another name")
-            row = {"id": key.id, "name": name, "role": role, "created_at": key.created_at, "sha256": _sha256(secret)}
+            row = {"id": key.id, "name": name, "role": role, "created_at": key.created_at, "sha256": sha256_of(secret)}
             db.table("keys").insert(row)
             record(db, "key", None, {}, {"key": key.id, "name": name, "role": role}, actor)
         return key, f"{PREFIX}_{key.id}_{secret}"
 
     def all(self) -> list[Key]:
         """Those that are valid, oldest first."""
-        return [_key(row) for row in self._connection.rows("SELECT * FROM keys WHERE revoked_at IS NULL ORDER BY rowid")]
+        return [key_of(row) for row in self._connection.rows("SELECT * FROM keys WHERE revoked_at IS NULL ORDER BY rowid")]
 
     def revoke(self, key_id: str, *, actor: str | None = None) -> Key:
         """Nobody is let in with it from now on, nor with a session that began with it. Raises NotFound."""
@@ -88,13 +88,15 @@ class Keys:
         prefix, _, rest = text.partition("_")
         key_id, _, secret = rest.partition("_")
         row = only(self._connection.rows("SELECT * FROM keys WHERE id = ? AND revoked_at IS NULL", key_id))
-        right = hmac.compare_digest(_sha256(secret), row["sha256"] if row else NOBODY)
-        return _key(row) if row and right and prefix == PREFIX else None
+        right = hmac.compare_digest(sha256_of(secret), row["sha256"] if row else NOBODY)
+        return key_of(row) if row and right and prefix == PREFIX else None
 
 
-def _sha256(secret: str) -> str:
+def sha256_of(secret: str) -> str:
+    """What is kept of a secret."""
     return hashlib.sha256(secret.encode(errors="replace")).hexdigest()
 
 
-def _key(row: Row) -> Key:
+def key_of(row: Row) -> Key:
+    """From its row."""
     return Key(row["id"], row["name"], row["role"], row["created_at"], row["revoked_at"])

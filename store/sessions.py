@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import hashlib
 import secrets
 from datetime import timedelta
 
 from store.connection import Connection, only
-from store.keys import Key
+from store.keys import Key, key_of, sha256_of
 from store.retention import ahead, now
 
 BYTES = 32
@@ -22,7 +21,7 @@ class Sessions:
     def begin(self, key: Key, span: timedelta) -> str:
         """What the browser sends from now on, for so long."""
         token = secrets.token_urlsafe(BYTES)
-        row = {"sha256": _sha256(token), "key_id": key.id, "created_at": now(), "expires_at": ahead(span)}
+        row = {"sha256": sha256_of(token), "key_id": key.id, "created_at": now(), "expires_at": ahead(span)}
         with self._connection.housekeeping() as db:
             db.table("sessions").insert(row)
         return token
@@ -33,19 +32,15 @@ class Sessions:
         The token is looked up by its hash: how long that takes tells of the hash, which nobody can choose.
         """
         query = "SELECT k.* FROM sessions s JOIN keys k ON k.id = s.key_id WHERE s.sha256 = ? AND s.expires_at > ? AND k.revoked_at IS NULL"
-        row = only(self._connection.rows(query, _sha256(token), now()))
-        return Key(row["id"], row["name"], row["role"], row["created_at"], None) if row else None
+        row = only(self._connection.rows(query, sha256_of(token), now()))
+        return key_of(row) if row else None
 
     def end(self, token: str) -> None:
         """Signs out."""
         with self._connection.housekeeping() as db:
-            db.execute("DELETE FROM sessions WHERE sha256 = ?", [_sha256(token)])
+            db.execute("DELETE FROM sessions WHERE sha256 = ?", [sha256_of(token)])
 
     def prune(self) -> None:
         """Forgets those that are over."""
         with self._connection.housekeeping() as db:
             db.execute("DELETE FROM sessions WHERE expires_at <= ?", [now()])
-
-
-def _sha256(token: str) -> str:
-    return hashlib.sha256(token.encode(errors="replace")).hexdigest()

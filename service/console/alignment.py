@@ -5,9 +5,6 @@ Letters: N points.
 
 from __future__ import annotations
 
-import numpy as np
-
-from core.boxes import OrientedBox
 from core.encode import EncodedBurst
 from core.reference import Reference
 from core.scan import infer_up
@@ -25,7 +22,7 @@ def aligned_scene(pose: Pose, reference: Reference, encoded: EncodedBurst, size:
     up, _ = infer_up(cameras)
     clouds = [
         cloud("reference", moved(pose, reference), "reference"),
-        cloud("seen", _near(encoded.cloud_m, pose.box), "target"),
+        cloud("seen", encoded.cloud_m[pose.box.holds(encoded.cloud_m, AROUND)], "target"),
     ]
     return scene(clouds, [box("box", pose.box)], [camera(each, size) for each in cameras], up)
 
@@ -34,11 +31,4 @@ def moved(pose: Pose, reference: Reference) -> FloatArray:
     """The reference's points in the burst's world, shape (N, 3)."""
     if pose.target_from_object is None:
         return pose.target_from_reference.apply(reference.cloud_m)
-    frame = reference.box.world_from_object
-    return pose.target_from_object.apply((reference.cloud_m - frame[:3, 3]) @ frame[:3, :3])
-
-
-def _near(points_m: FloatArray, oriented: OrientedBox) -> FloatArray:
-    frame = oriented.world_from_object
-    in_object = (points_m - frame[:3, 3]) @ frame[:3, :3]
-    return points_m[(np.abs(in_object) <= AROUND * oriented.extent_m / 2).all(axis=1)]
+    return pose.target_from_object.apply(reference.box.in_object(reference.cloud_m))

@@ -11,7 +11,7 @@ from core.novelty import BEST
 from service.agent import Agent
 from service.console.change import done
 from service.console.pages import Page, query, render
-from service.console.score_chart import score_chart
+from service.console.score_chart import ScoreChart, score_chart
 from service.console.token_map import token_map
 from service.deps import ActorDep, AgentDep, WorkDep
 from service.routes.memory import export_memory
@@ -34,16 +34,23 @@ def memory(
     if before is not None and "hx-request" in request.headers:
         return render(request, "memory_changes.html", **listed)
     settings: Settings = request.app.state.settings
-    charts = [(verified, score_chart(agent.upkeep.distribution(verified))) for verified in (True, False)]
     return render(
         request,
         "memory.html",
         **listed,
         info=MemoryInfo.of(agent),
-        charts=charts if agent.config.score == BEST and agent.config.threshold is None else [],
+        charts=_charts(agent),
         settings=settings,
         done=done(agent, change),
     )
+
+
+def _charts(agent: Agent) -> list[tuple[bool, ScoreChart]]:
+    """Whether poses were tried, and the evidence then; none where the threshold is not made of a rate."""
+    if agent.config.score != BEST or agent.config.threshold is not None:
+        return []
+    tokens, verified = agent.upkeep.distributions()
+    return [(True, score_chart(verified)), (False, score_chart(tokens))]
 
 
 @router.get("/map")

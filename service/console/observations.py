@@ -13,6 +13,7 @@ from service.access import ACCESS
 from service.agent import Agent
 from service.auth import Caller
 from service.console.alignment import aligned_scene
+from service.console.change import Name
 from service.console.evidence import Hypothesis, Matrix, Stage
 from service.console.pages import Page, render
 from service.console.words import called
@@ -112,7 +113,7 @@ async def observation_correct(
     agent: AgentDep,
     work: WorkDep,
     category_id: Annotated[str, Form()] = "",
-    name: Annotated[str, Form(max_length=200)] = "",
+    name: Name = "",
 ) -> Response:
     """What it was really of; a new category where none is named."""
     caller: Caller = request.state.caller

@@ -58,7 +58,7 @@ def reference_scene(reference: Reference, burst: Burst) -> Part:
     trusted = [(view.points_m[view.trusted], view.descriptors[view.trusted]) for view in reference.views]
     points = np.concatenate([each for each, _ in trusted])
     painted = ComponentColours.of(reference.basis, reference.views).paint(np.concatenate([each for _, each in trusted]))
-    near = _inside(points, reference.box)
+    near = reference.box.holds(points, BESIDE)
     clouds = [
         cloud("surface", surface, colours=colours, choice="Image"),
         cloud("patches", points[near], colours=painted[near].astype(np.uint8), choice="Components"),
@@ -88,11 +88,5 @@ def _surface(view: View, encoded: EncodedView, oriented: OrientedBox) -> tuple[F
     assert view.camera is not None
     rows, columns = np.nonzero((mask_picture(view, encoded)[..., 0] > 0) & (view.depth_m > 0))
     points = view.camera.back_project(np.stack([columns, rows], axis=-1).astype(float), view.depth_m[rows, columns])
-    near = _inside(points, oriented)
+    near = oriented.holds(points, BESIDE)
     return points[near], view.rgb[rows, columns][near]
-
-
-def _inside(points_m: FloatArray, oriented: OrientedBox) -> NDArray[np.bool_]:
-    frame = oriented.world_from_object
-    in_object = (points_m - frame[:3, 3]) @ frame[:3, :3]
-    return np.asarray((np.abs(in_object) <= oriented.extent_m / 2 * BESIDE).all(axis=1))

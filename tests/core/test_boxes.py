@@ -27,6 +27,13 @@ def test_moving_the_box_moves_its_corners(moved: Sim3) -> None:
     assert np.allclose(box.moved_by(moved).corners(), moved.apply(box.corners()))
 
 
+def test_corners_lie_on_the_surface_of_their_own_frame(moved: Sim3) -> None:
+    box = oriented_box(moved.apply(brick()))
+    assert np.allclose(np.abs(box.in_object(box.corners())), box.extent_m / 2)
+    assert box.holds(box.corners(), times=1.01).all()
+    assert not box.holds(box.corners(), times=0.99).any()
+
+
 def test_twelve_edges_of_one_axis_each() -> None:
     assert len(BOX_EDGES) == 12
     assert all(bin(first ^ second).count("1") == 1 for first, second in BOX_EDGES)
