@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import logging
+import time
 from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager, contextmanager
 from importlib.metadata import version
 
 import anyio
+import numpy as np
 from anyio.to_thread import run_sync
 from fastapi import FastAPI
 
 from core.backbones.base import Backbone
 from core.backbones.dino import load_backbone
+from core.encode import EncoderConfig
 from service import errors, openapi
 from service.agent import Agent, AgentConfig
 from service.auth import Guard
@@ -20,12 +23,12 @@ from service.batching import BatchingBackbone
 from service.browsers import OwnPagesOnly
 from service.console.demo import Demo
 from service.console.install import install as install_console
-from service.events import Events
+from service.events import Event, Events
 from service.limits import UploadLimit
+from service.logs import Logged, log_event
 from service.metrics import Measured, Metrics
 from service.routes import categories, goals, health, memory, observations, scans, track
 from service.settings import Settings
-from service.work import WorkQueue
 from store.memory import Memory
 
 DESCRIPTION = """A growing memory of object categories for robots: look once at one object, then find and pose others of its kind.
@@ -50,14 +53,16 @@ def create_app(settings: Settings, *, backbone: Backbone | None = None, asks: bo
         with open_agent(settings, backbone, metrics) as agent:
             app.state.agent = agent
             app.state.guard = Guard(agent.memory.keys, agent.memory.sessions, settings.rate_limit, asks=asks)
-            app.state.work = work = WorkQueue(settings.workers, settings.queue)
-            metrics.watch_work(lambda: work.pending)
+            app.state.work = work = metrics.watched_queue(settings.workers, settings.queue)
+            metrics.tell_build(agent.backbone.name)
             async with anyio.create_task_group() as tasks:
                 tasks.start_soon(_keep_pruned, agent.memory)
                 try:
                     yield
                 finally:
+                    work.stop()
                     await run_sync(app.state.demo.close)
+                    await work.finished()  # the memory is closed after this
                 tasks.cancel_scope.cancel()
 
     app = FastAPI(
@@ -74,6 +79,7 @@ def create_app(settings: Settings, *, backbone: Backbone | None = None, asks: bo
     app.add_middleware(UploadLimit, max_mb=settings.max_upload_mb)
     app.add_middleware(OwnPagesOnly)
     app.add_middleware(Measured, metrics=metrics)
+    app.add_middleware(Logged)
     errors.install(app)
     routers = (observations.router, scans.router, categories.router, goals.router, memory.router, memory.live, track.router, health.router)
     for router in routers:
@@ -98,7 +104,12 @@ def open_agent(settings: Settings, backbone: Backbone | None, metrics: Metrics) 
     Raises what `Settings`, `Memory.open`, `load_backbone` and `Agent` raise.
     """
     with _checked(settings, backbone) as (opened, loaded, config):
-        agent = Agent(BatchingBackbone(loaded, metrics.count_pass), opened, config, Events(metrics.count_event))
+
+        def tell(event: Event) -> None:
+            metrics.count_event(event)
+            log_event(event)
+
+        agent = Agent(BatchingBackbone(loaded, metrics.count_pass), opened, config, Events(tell))
         try:
             yield agent
         finally:
@@ -120,4 +131,14 @@ def _checked(settings: Settings, backbone: Backbone | None = None) -> Iterator[t
     config.validate()
     with Memory.open(settings.data_dir, settings.retention) as opened:
         settings.require_safe(len(opened.keys.all()))
-        yield opened, backbone or load_backbone(settings.backbone, device=settings.device, report=log.info), config
+        yield opened, backbone or _warm_backbone(settings), config
+
+
+def _warm_backbone(settings: Settings) -> Backbone:
+    """Loaded, and used once: whoever is answered first does not wait for memory and kernels."""
+    loaded = load_backbone(settings.backbone, device=settings.device, report=log.info)
+    side = EncoderConfig().grid * loaded.patch_size
+    started = time.perf_counter()
+    loaded.extract(np.zeros((1, side, side, 3), np.uint8))
+    log.info("warmed up", extra={"about": {"backbone": loaded.name, "seconds": round(time.perf_counter() - started, 3)}})
+    return loaded

@@ -18,12 +18,14 @@ from starlette.requests import HTTPConnection
 
 from core.errors import OneLookError
 from service.access import ACCESS, ADMIN, allows
+from service.logs import robot
 from service.rate import RateLimit
 from store.keys import Key, Keys, Role
 from store.sessions import Sessions
 
 Answer = Callable[[Request], Coroutine[Any, Any, Response]]
 COOKIE = "onelook_session"
+LONGEST_ACTOR = 200
 HOW = "send the header `Authorization: Bearer KEY` (ONELOOK_API_KEY for the client and the commands)"
 
 
@@ -83,6 +85,7 @@ class Guard:
             self._require_rate(key)
         caller = Caller(key.name, key.role) if key else ANYBODY
         connection.state.caller = caller
+        robot.set(caller.as_actor(connection.headers.get("x-actor", "")[:LONGEST_ACTOR]) or None)
         if not caller.may(needed):
             raise NotAllowed(f"the key {caller.name!r} has the role {caller.role}, this takes {needed}; ask for another key")
 

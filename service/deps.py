@@ -17,7 +17,7 @@ from starlette.formparsers import MultiPartException, MultiPartParser
 from core.errors import InvalidInput
 from core.views import Burst
 from service.agent import Agent
-from service.auth import Caller
+from service.auth import LONGEST_ACTOR, Caller
 from service.decoding import Parts, Upload, decode_parts
 from service.npz import decode_npz
 from service.settings import Settings
@@ -44,7 +44,7 @@ def _actor(
         Header(
             alias="X-Actor",
             min_length=1,
-            max_length=200,
+            max_length=LONGEST_ACTOR,
             description="Who asks; kept in the audit trail, after the name of their key where there is one. Never checked.",
         ),
     ] = None,

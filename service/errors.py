@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
 from http import HTTPStatus
 from typing import Any
@@ -13,10 +14,12 @@ from starlette.exceptions import HTTPException
 
 from core import errors as core
 from service.auth import NoKey, NotAllowed, TooOften
+from service.logs import HEADER, request_id
 from service.schemas.problem import MEDIA_TYPE, FieldError, Problem
 from service.work import Busy
 from store.requests import StillRunning
 
+log = logging.getLogger("onelook")
 KINDS: tuple[tuple[type[core.OneLookError], int, str, str], ...] = (
     (core.TooFewViews, 422, "too-few-views", "More views are needed"),
     (core.NoObject, 422, "no-object", "No object stands out from the background"),
@@ -54,6 +57,8 @@ def problem_of(error: core.OneLookError) -> Problem:
 
 def _on_onelook_error(request: Request, error: Exception) -> JSONResponse:
     assert isinstance(error, core.OneLookError)
+    if isinstance(error, core.Unavailable) and not isinstance(error, Busy):
+        log.warning(str(error))
     return problem_answer(error)
 
 
@@ -116,7 +121,8 @@ def _on_http_exception(request: Request, error: Exception) -> JSONResponse:
 
 
 def _on_unexpected(request: Request, error: Exception) -> JSONResponse:
-    return _answer(_unexpected())
+    # Answered outside the middleware that names the others.
+    return _answer(_unexpected(), {HEADER: request_id.get() or ""})
 
 
 def _unexpected() -> Problem:

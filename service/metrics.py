@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from importlib.metadata import version
+from typing import get_args
 
-from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, generate_latest
+from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, ProcessCollector, generate_latest
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.events import Event
+from service.work import Refusal, WorkQueue
 from store.memory import Memory
+from store.records import Outcome, ScanState
 
 SECONDS = (0.01, 0.03, 0.1, 0.3, 1, 3, 10, 30, 100)
 IMAGES = (1, 2, 4, 8, 16, 32, 64)
@@ -20,6 +24,8 @@ class Metrics:
 
     def __init__(self) -> None:
         self._registry = CollectorRegistry()
+        ProcessCollector(registry=self._registry)
+        self._build = Gauge("onelook_build_info", "Of the service and its backbone.", ("version", "backbone"), registry=self._registry)
         self._requests = Counter("onelook_requests", "Requests answered.", ("method", "route", "status"), registry=self._registry)
         self._request_seconds = Histogram(
             "onelook_request_seconds",
@@ -36,12 +42,34 @@ class Metrics:
         )
         self._events = Counter("onelook_events", "What happened, as /v1/events tells it.", ("kind",), registry=self._registry)
         self._observations = Counter("onelook_observations", "Observations decided.", ("outcome",), registry=self._registry)
+        for outcome in get_args(Outcome):
+            self._observations.labels(outcome)  # a rate needs its zero
+        self._waited = Histogram(
+            "onelook_work_wait_seconds", "From a request's arrival to the begin of its work.", buckets=SECONDS, registry=self._registry
+        )
+        self._refused = Counter("onelook_work_refused", "Requests sent away.", ("reason",), registry=self._registry)
+        for reason in get_args(Refusal):
+            self._refused.labels(reason)
+        self._scans = Gauge("onelook_scans", "Scans that the memory knows of.", ("state",), registry=self._registry)
         self._kept = Gauge("onelook_memory_kept", "What the memory holds.", ("kind",), registry=self._registry)
+        self._bytes = Gauge("onelook_memory_bytes", "What the memory takes on disk, the bin included.", registry=self._registry)
         self._version = Gauge("onelook_memory_version", "Grows with each change of the memory.", registry=self._registry)
 
-    def watch_work(self, pending: Callable[[], int]) -> None:
-        """Shows how many pieces of work run or wait."""
-        Gauge("onelook_work_pending", "Requests that are worked on or wait.", registry=self._registry).set_function(pending)
+    def watched_queue(self, workers: int, queue: int) -> WorkQueue:
+        """A queue whose length and refusals are shown."""
+        work = WorkQueue(workers, queue, self._waited.observe, lambda why: self._refused.labels(why).inc())
+        shown: dict[str, tuple[str, Callable[[], float]]] = {
+            "onelook_work_running": ("Requests that are worked on.", lambda: work.running),
+            "onelook_work_waiting": ("Requests that wait.", lambda: work.waiting),
+            "onelook_work_places": ("Requests that may be worked on or wait.", lambda: workers + queue),
+        }
+        for name, (says, value) in shown.items():
+            Gauge(name, says, registry=self._registry).set_function(value)
+        return work
+
+    def tell_build(self, backbone: str) -> None:
+        """Shows what answers."""
+        self._build.labels(version("onelook"), backbone).set(1)
 
     def count_pass(self, images: int) -> None:
         """One pass of the backbone."""
@@ -65,7 +93,10 @@ class Metrics:
         sizes = memory.sizes()
         for kind in ("categories", "instances", "observations", "scans", "goals"):
             self._kept.labels(kind).set(getattr(sizes, kind))
-        self._kept.labels("bytes").set(sizes.size)
+        self._bytes.set(sizes.size)
+        states = memory.scans.states()
+        for state in get_args(ScanState):
+            self._scans.labels(state).set(states.get(state, 0))
         self._version.set(memory.version)
         return generate_latest(self._registry)
 

@@ -13,6 +13,7 @@ from pydantic_settings import BaseSettings, SettingsConfigDict
 from core.backbones.dino import EMBEDDED
 from core.errors import InvalidInput
 from core.novelty import DEFAULT_SCORE
+from service.logs import Form
 from store.retention import Retention
 
 
@@ -39,6 +40,7 @@ class Settings(BaseSettings):
     queue: int = Field(16, ge=0, description="Requests that may wait; more are answered 503 with Retry-After.")
     max_tracks: int = Field(4, ge=0, description="Objects that are followed at once over WS /v1/track.")
     rate_limit: int = Field(3000, gt=0, description="Requests a minute with one key; more are answered 429 with Retry-After.")
+    log: Form = Field("text", description="Lines of the log: `text` for people, `json` for programs.")
     session_h: float = Field(12, gt=0, description="Hours after which somebody who signed in to the console is signed out.")
     backup_dir: Path | None = Field(None, description="Folder that backups are made in; beside the memory where left out.")
     max_views: int = Field(32, gt=0, description="Most views in one burst.")

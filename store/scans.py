@@ -52,6 +52,12 @@ class Scans:
         rows = self._connection.rows(f"{SELECT} WHERE s.{OPEN} AND s.expires_at > ? ORDER BY s.rowid DESC LIMIT ?", now(), limit)
         return [_scan(row) for row in rows]
 
+    def states(self) -> dict[str, int]:
+        """How many scans are in each state; none where a state is left out."""
+        state = f"CASE WHEN {OPEN} AND expires_at <= ? THEN 'expired' ELSE state END"
+        rows = self._connection.rows(f"SELECT {state} AS state, count(*) AS n FROM scans GROUP BY 1", now())
+        return {row["state"]: row["n"] for row in rows}
+
     def require_open(self, scan_id: str) -> Scan:
         """Raises NotFound, and Conflict where it is completed or expired."""
         scan = self.get(scan_id)

@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from service.settings import Settings
 
 log = logging.getLogger("onelook")
-GRACE_S = 5
-"""For answers under way, once it shall stop."""
 
 
 class ServeCommand(TyperCommand):
@@ -51,21 +49,19 @@ def serve(
     threshold: Annotated[float | None, typer.Option(help="Least similarity of a known object; the score's own where left out.")] = None,
 ) -> None:
     """Start the service. What has no option here is set by the variables below."""
-    import uvicorn
-
     from service.app import checked_backbone, create_app
+    from service.logs import config
+    from service.server import Server
 
     given = {"host": host, "port": port, "data_dir": data_dir, "backbone": backbone, "device": device, "threshold": threshold}
     settings = read_settings({name: value for name, value in given.items() if value is not None})
-    logging.config.dictConfig(_log_config())
+    logging.config.dictConfig(config(settings.log))
     with _bound(settings.host, settings.port) as listener:
         # Opened once before uvicorn starts, which would wrap the sentence that says what is wrong in a traceback.
         app = create_app(settings, backbone=checked_backbone(settings))
-        # Listeners to events and tracks would keep it from ending for as long as they like.
-        server = uvicorn.Server(uvicorn.Config(app, log_config=None, timeout_graceful_shutdown=GRACE_S))
         log.info("serving on http://%s:%d, memory in %s; Ctrl+C stops it", settings.host, listener.getsockname()[1], settings.data_dir)
         with contextlib.suppress(KeyboardInterrupt):
-            server.run(sockets=[listener])
+            Server(app).run(sockets=[listener])
 
 
 def read_settings(given: dict[str, object]) -> Settings:
@@ -81,14 +77,6 @@ def read_settings(given: dict[str, object]) -> Settings:
         name = str(first["loc"][0])
         field = f"--{name.replace('_', '-')}" if name in given else f"ONELOOK_{name.upper()}"
         raise InvalidInput(field, f"{first['msg']}, found {first['input']!r}") from error
-
-
-def _log_config() -> dict[str, object]:
-    """Uvicorn's, with this service's own messages beside it on stderr."""
-    from uvicorn.config import LOGGING_CONFIG
-
-    own = {log.name: {"handlers": ["default"], "level": "INFO", "propagate": False}}
-    return LOGGING_CONFIG | {"loggers": LOGGING_CONFIG["loggers"] | own}
 
 
 def _bound(host: str, port: int) -> socket.socket:

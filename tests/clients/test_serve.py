@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import json
 import logging
 import socket
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import ClassVar
 
+import numpy as np
 import pytest
 import uvicorn
+from numpy.typing import NDArray
 from typer.testing import CliRunner, Result
 
 import service.app
@@ -19,9 +23,14 @@ from store.memory import Memory
 
 
 class Loaded:
-    """What a memory is tied to."""
+    """A backbone as far as a start needs one."""
 
-    name, fingerprint = "centre", "centre-1"
+    name, fingerprint, patch_size = "centre", "centre-1", 14
+    passes: ClassVar[list[tuple[int, ...]]] = []
+
+    def extract(self, images: NDArray[np.uint8]) -> None:
+        """Notes that it was used."""
+        self.passes.append(images.shape)
 
 
 @pytest.fixture(autouse=True)
@@ -29,8 +38,9 @@ def loading(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """A backbone that is there at once, no server, and the loggers as they were."""
     monkeypatch.setattr(service.app, "load_backbone", lambda name, device, report: Loaded())
     monkeypatch.setattr(uvicorn.Server, "run", lambda server, sockets: None)
+    monkeypatch.setattr(Loaded, "passes", [])
     yield
-    for name in ("onelook", "uvicorn", "uvicorn.access"):
+    for name in ("onelook", "uvicorn"):
         logging.getLogger(name).handlers.clear()
 
 
@@ -48,7 +58,7 @@ def serve(tmp_path: Path) -> Callable[..., Result]:
 def refused(result: Result, *words: str) -> None:
     """Asserts one sentence on stderr that has all `words`."""
     assert result.exit_code == 1, result.output
-    (sentence,) = [line for line in result.stderr.splitlines() if not line.startswith("INFO")]
+    (sentence,) = [line for line in result.stderr.splitlines() if " INFO " not in line]
     assert sentence.startswith("error: ")
     for word in words:
         assert word in sentence
@@ -59,6 +69,20 @@ def test_it_says_where_it_serves(serve: Callable[..., Result], tmp_path: Path) -
     assert started.exit_code == 0, started.output
     assert "serving on http://127.0.0.1:" in started.stderr
     assert str(tmp_path / "memory") in started.stderr
+
+
+def test_it_listens_only_once_it_is_warm(serve: Callable[..., Result], monkeypatch: pytest.MonkeyPatch) -> None:
+    before_it_listened: list[tuple[int, ...]] = []
+    monkeypatch.setattr(uvicorn.Server, "run", lambda server, sockets: before_it_listened.extend(Loaded.passes))
+    assert "warmed up" in serve().stderr
+    assert before_it_listened == [(1, 392, 392, 3)]
+
+
+def test_the_log_is_json_where_it_is_asked_for(serve: Callable[..., Result], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ONELOOK_LOG", "json")
+    assert [json.loads(line)["message"].split()[0] for line in serve().stderr.splitlines()] == ["warmed", "serving"]
+    monkeypatch.setenv("ONELOOK_LOG", "xml")
+    refused(serve(), "ONELOOK_LOG", "'xml'")
 
 
 def test_the_first_start_tells_of_the_download(serve: Callable[..., Result], monkeypatch: pytest.MonkeyPatch) -> None:
