@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from functools import partial
 from pathlib import Path
 
@@ -21,12 +21,14 @@ from clients.datasets import folders
 from clients.datasets.samples import data_or_samples
 from clients.datasets.sources import find_sequences
 from core.backbones.dino import load_backbone
+from core.backbones.whitening import Whitening
 from core.encode import EncodedBurst, Encoder
 from core.errors import InvalidInput
 from core.evidence import sample_patches
-from core.novelty import DEFAULT_SCORE, SCORE_NAMES, DecisionConfig, Member, decide
+from core.novelty import BEST, DEFAULT_SCORE, SCORE_NAMES, VERIFIED, Context, DecisionConfig, Member, decide
 from core.pose import VARIANTS, PoseConfig, PoseEstimator
 from core.reference import Reference, build_reference
+from core.verification import agreement
 from core.views import Burst
 
 WARM_UP = 1
@@ -72,6 +74,7 @@ def run(
     memory = [Member("reference", scanned.cls, scanned.pooled, sample_patches(scanned))]
     operations: dict[str, Operation] = {"encode": partial(_encode, encoder, target_burst), "learn": partial(_learn, scanned)}
     operations |= {f"decide {score}": partial(_decide, memory, target, score) for score in SCORE_NAMES}
+    operations |= {f"decide {BEST}, {VERIFIED} poses": partial(_verify, memory[0], target, reference, network.whitening)}
     operations |= {f"solve {name}": partial(_solve, PoseEstimator(PoseConfig.named(name)), reference, target) for name in VARIANTS}
     rows = table_rows(_rounds(operations, rounds), OBSERVATION)
     if json is not None:
@@ -127,6 +130,17 @@ def _learn(scanned: EncodedBurst) -> dict[str, float]:
 
 def _decide(memory: Sequence[Member], target: EncodedBurst, score: str) -> dict[str, float]:
     decide(memory, target, DecisionConfig(score))
+    return {}
+
+
+def _verify(member: Member, target: EncodedBurst, reference: Reference, whitening: Whitening | None) -> dict[str, float]:
+    """With the poses of as many categories as are ever tried, which are one and the same here."""
+
+    def verify(category_id: str) -> float:
+        pose = PoseEstimator(PoseConfig.named("best")).estimate(reference, target).target_from_reference
+        return agreement(reference, target, pose, whitening)
+
+    decide([replace(member, category_id=str(copy)) for copy in range(VERIFIED)], target, context=Context(whitening, verify=verify))
     return {}
 
 

@@ -6,7 +6,7 @@ Letters: F views of a category over all its bursts, G views of the target, V vie
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -98,6 +98,11 @@ class Decision:
     def candidates(self) -> tuple[str, ...]:
         """Categories that an uncertain burst may be of: those that no clear answer rules out."""
         return tuple(category for category, similarity in self.similarities if similarity > self.uncertain_above)
+
+    def corrected(self, category_id: str) -> Decision:
+        """With the rival that it would have, had it known that the burst is of this category; a paper score has none."""
+        wrong = [similarity for category, similarity in self.similarities if category != category_id]
+        return replace(self, rival=max(wrong, default=None) if self.score == BEST else None)
 
 
 def paper_sum(category: FloatArray, target: FloatArray) -> float:

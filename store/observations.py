@@ -138,9 +138,10 @@ class Observations:
         return [_observation(row) for row in rows]
 
     def decisions(self, limit: int) -> list[Decision]:
-        """The latest decisions, newest first."""
-        rows = self._connection.rows("SELECT decision FROM observations WHERE decision IS NOT NULL ORDER BY rowid DESC LIMIT ?", limit)
-        return [decision_from_json(row["decision"]) for row in rows]
+        """The latest decisions, newest first; what a person corrected counts as they said."""
+        latest = "SELECT decision, corrected_to FROM observations WHERE decision IS NOT NULL ORDER BY rowid DESC LIMIT ?"
+        found = [(decision_from_json(row["decision"]), row["corrected_to"]) for row in self._connection.rows(latest, limit)]
+        return [decision if said is None else decision.corrected(said) for decision, said in found]
 
     def get(self, observation_id: str) -> Observation:
         """Raises NotFound."""

@@ -116,6 +116,22 @@ def rendering(
     run(json, category or [], frames, seed)
 
 
+@app.command("next-view")
+def next_view(
+    category: Annotated[list[str] | None, typer.Option(help="Category of the simulator; may be repeated; all where left out.")] = None,
+    instances: Annotated[int, typer.Option(min=1, help="Objects met of each category.")] = 3,
+    looks: Annotated[int, typer.Option(min=1, max=12, help="Views of one side with which an answer is first sought.")] = 2,
+    rate: Annotated[float, typer.Option(help="False-known rate asked for.")] = 0.01,
+    seed: Seed = 0,
+    backbone: Backbone = BACKBONE,
+    json: JsonFile = None,
+) -> None:
+    """Whether one more view, from where an uncertain answer says, settles it: in the simulated world."""
+    from benchmarks.next_view import run
+
+    run(json, category or [], instances, looks, rate, seed, backbone)
+
+
 @app.command()
 def isolation(
     data: Data,

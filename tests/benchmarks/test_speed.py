@@ -21,7 +21,7 @@ def test_every_stage_is_timed(recorded: Path, monkeypatch: pytest.MonkeyPatch, b
     monkeypatch.setattr(speed, "load_backbone", lambda name, device: backbone)
     rows = speed.run(None, data=recorded, views=4, rounds=1)
     totals = {row.operation for row in rows if row.stage == "total"}
-    assert {"encode", "learn", *(f"solve {variant}" for variant in VARIANTS)} <= totals
+    assert {"encode", "learn", "decide best, 3 poses", *(f"solve {variant}" for variant in VARIANTS)} <= totals
     assert sum(row.ratio for row in rows if row.stage == "total" and row.operation in speed.OBSERVATION) == pytest.approx(1)
 
 

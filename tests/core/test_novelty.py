@@ -10,7 +10,7 @@ import pytest
 from core.encode import EncodedBurst
 from core.errors import InvalidInput
 from core.evidence import PATCHES
-from core.novelty import SCORES, Context, DecisionConfig, Member, best_view, decide, paper_mean, paper_sum
+from core.novelty import SCORES, Context, Decision, DecisionConfig, Member, best_view, decide, paper_mean, paper_sum
 from core.sim3 import Sim3
 
 from .conftest import PaintedObject
@@ -161,3 +161,10 @@ def test_a_threshold_of_the_callers_own_leaves_no_third_answer(painted: PaintedO
 def test_an_impossible_rate_is_refused(rate: float) -> None:
     with pytest.raises(InvalidInput, match="false_known_rate"):
         DecisionConfig(false_known_rate=rate)
+
+
+def test_a_corrected_decision_has_the_best_of_the_others_as_its_rival() -> None:
+    decided = Decision("known", "best", 0.3, (("cup", 0.5), ("bowl", 0.4), ("vase", 0.1)), rival=0.4)
+    assert [decided.corrected(said).rival for said in ("cup", "bowl", "a new one")] == [0.4, 0.5, 0.5]
+    assert Decision("novel", "best", 0.3, ()).corrected("cup").rival is None
+    assert replace(decided, score="paper_mean").corrected("cup").rival is None

@@ -40,6 +40,17 @@ def test_a_decision_comes_back(memory: Memory, burst: Burst) -> None:
     assert (seen.outcome, seen.frame, seen.views, seen.timings_ms) == ("novel", "map", 3, {"total": 12.5})
 
 
+def test_a_corrected_decision_tells_what_the_wrong_categories_reached(
+    memory: Memory, reference: Reference, burst: Burst, encoded: EncodedBurst
+) -> None:
+    right, wrong = (memory.categories.create(reference, burst, encoded).id for _ in range(2))
+    decision = Decision("uncertain", "best", 0.4, ((right, 0.3), (wrong, 0.2)))
+    seen = memory.observations.create(replace(NOVEL, decision=decision), burst, FEATURES)
+    assert [each.rival for each in memory.observations.decisions(5)] == [None]
+    memory.corrections.to_category(seen.id, right, encoded)
+    assert [each.rival for each in memory.observations.decisions(5)] == [0.2]
+
+
 def test_a_pose_comes_back_exactly(memory: Memory, reference: Reference, burst: Burst, encoded: EncodedBurst) -> None:
     answer = known(memory.categories.create(reference, burst, encoded).id)
     pose = memory.observations.create(answer, burst, FEATURES).pose
