@@ -53,7 +53,7 @@ def test_the_commands_are_found() -> None:
 def test_documented_commands_exist() -> None:
     known = {" ".join(command.split()[:words]) for command in COMMANDS for words in (2, 3)}
     shown = set(re.findall(r"(?:^|`)(onelook [a-z]+)(?: |`|$)", TEXT, re.MULTILINE))
-    shown |= set(re.findall(r"(?:^|`)(onelook (?:bench|categories) [a-z]+)", TEXT, re.MULTILINE))
+    shown |= set(re.findall(r"(?:^|`)(onelook (?:bench|categories) [a-z-]+)", TEXT, re.MULTILINE))
     assert shown <= known
 
 
