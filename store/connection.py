@@ -49,7 +49,7 @@ class Connection:
             self._db.enable_wal()
             self._db.execute("PRAGMA synchronous = FULL")  # a committed row survives a power cut, as its folder does
             self._db.execute("PRAGMA foreign_keys = ON")
-            upgrade(self._db)
+            upgrade(self._db, root / DATABASE)
             self._db.execute(f"PRAGMA query_only = {int(only_read)}")
         except (sqlite3.Error, UnicodeDecodeError) as error:  # SQLite quotes the damage, which need not be text
             self._db.close()

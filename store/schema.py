@@ -4,18 +4,23 @@ from __future__ import annotations
 
 import hashlib
 import sqlite3
+from contextlib import closing
 from pathlib import Path
 
 from sqlite_utils import Database, Migrations
 from sqlite_utils.db import ForeignKey
 
-from core.errors import Conflict
+from core.errors import Conflict, Unavailable
+from store.folders import PARTIAL, sync
 
 migrations = Migrations("onelook")
 
 
-def upgrade(db: Database) -> None:
-    """Brings `db` to this version's tables. Raises Conflict for a database that a later version made."""
+def upgrade(db: Database, database: Path | None = None) -> None:
+    """Brings `db` to this version's tables; where it is an earlier version's file `database`, that is copied first.
+
+    Raises Conflict for a database that a later version made, Unavailable where the copy cannot be written.
+    """
     with Database(memory=True) as empty:
         known = {migration.name for migration in migrations.pending(empty)}
     later = sorted({migration.name for migration in migrations.applied(db)} - known)
@@ -23,7 +28,27 @@ def upgrade(db: Database) -> None:
         raise Conflict(
             f"the memory was made by a later version of OneLook (steps unknown here: {', '.join(later)}); upgrade onelook to open it"
         )
+    pending = migrations.pending(db)
+    if database is not None and pending and migrations.applied(db):
+        _keep(db, database.with_name(f"{database.name}.before-{pending[0].name}"))
     migrations.apply(db)
+
+
+def _keep(db: Database, copy: Path) -> None:
+    """Writes what `db` holds to the file `copy`, whole or not at all; one of an earlier attempt at the same step is replaced."""
+    partial = copy.with_name(PARTIAL + copy.name)
+    try:
+        partial.unlink(missing_ok=True)
+        with closing(sqlite3.connect(partial)) as target:
+            db.conn.backup(target)
+        sync(partial)
+        partial.replace(copy)
+        sync(copy.parent)
+    except (OSError, sqlite3.Error) as error:
+        partial.unlink(missing_ok=True)
+        raise Unavailable(
+            f"cannot copy the memory's rows to {copy} before they are upgraded: {error}; free space and start again"
+        ) from error
 
 
 def outdated(database: Path) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import sqlite3
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -11,7 +12,7 @@ import pytest
 from sqlite_utils import Database
 
 from core.encode import EncodedBurst
-from core.errors import Conflict
+from core.errors import Conflict, Unavailable
 from core.evidence import sample_patches
 from core.reference import Reference
 from core.views import Burst
@@ -98,6 +99,56 @@ def test_a_memory_of_a_later_version_is_refused(folder: Path, memory: Memory) ->
         db.table("_sqlite_migrations").insert({"migration_set": "onelook", "name": "m999_later", "applied_at": "2099"})
     with pytest.raises(Conflict, match="m999_later"):
         Memory.open(folder)
+
+
+def dump(database: Path) -> list[str]:
+    """Every table and row, as SQL."""
+    with Database(sqlite3.connect(f"file:{database}?mode=ro", uri=True)) as db:
+        return list(db.conn.iterdump())
+
+
+def test_rows_are_copied_before_they_are_upgraded(first_version: Path) -> None:
+    before = dump(first_version / "memory.sqlite3")
+    with Memory.open(first_version):
+        pass
+    (copy,) = first_version.glob("memory.sqlite3.before-*")
+    assert copy.name == "memory.sqlite3.before-m002_years"
+    assert dump(copy) == before != dump(first_version / "memory.sqlite3")
+
+
+def test_the_copy_in_its_old_place_is_the_memory_of_before(first_version: Path) -> None:
+    """Going back: what the earlier version had is in the copy, and the folders that it names are still there."""
+    with Memory.open(first_version) as memory:
+        learnt = [category.id for category in memory.categories.all()]
+    shutil.copy(first_version / "memory.sqlite3.before-m002_years", first_version / "memory.sqlite3")
+    for left in first_version.glob("memory.sqlite3-*"):
+        left.unlink()
+    with Memory.open(first_version) as memory:
+        assert [category.id for category in memory.categories.all()] == learnt
+        assert memory.check().ok
+
+
+def test_a_new_memory_and_one_of_this_version_are_not_copied(folder: Path) -> None:
+    for _ in range(2):
+        with Memory.open(folder):
+            pass
+    assert list(folder.glob("*before*")) == []
+
+
+def test_without_room_for_the_copy_nothing_is_upgraded(first_version: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    before = dump(first_version / "memory.sqlite3")
+
+    def full(path: Path) -> None:
+        raise OSError(28, "No space left on device")
+
+    with monkeypatch.context() as broken:
+        broken.setattr("store.schema.sync", full)
+        with pytest.raises(Unavailable, match="free space"):
+            Memory.open(first_version)
+    assert dump(first_version / "memory.sqlite3") == before
+    assert [path.name for path in first_version.iterdir() if "before" in path.name] == []
+    with Memory.open(first_version) as memory:
+        assert memory.check().ok
 
 
 def test_upgrading_twice_changes_nothing() -> None:
