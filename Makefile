@@ -2,7 +2,7 @@
 SHELL := /bin/bash
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help setup weights demo test lint types unit browser serve bench clean
+.PHONY: help setup weights demo test lint types unit browser serve bench soak clean
 
 # The python to build the environment with: the newest of 3.10 and later on the PATH.
 PYTHON ?= $(shell for name in python3.13 python3.12 python3.11 python3.10 python3 python; do \
@@ -69,6 +69,9 @@ serve: setup ## the service on 127.0.0.1:8000
 bench: setup ## accuracy and discovery of the recordings in DATA; tables, and JSON in OUT
 	@$(BIN)/onelook bench pose --data $(DATA) --json $(OUT)/pose.json
 	@$(BIN)/onelook bench discovery --data $(DATA) --json $(OUT)/discovery.json
+
+soak: setup ## two robots live with a service for half an hour; fails where it grows; a plot and JSON in OUT
+	@$(BIN)/onelook bench soak --minutes 30 --robots 2 --plot $(OUT)/soak.png --json $(OUT)/soak.json
 
 clean: ## remove what make made; weights and encoded bursts stay in the user's cache
 	@rm -rf $(VENV) build *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis $(OUT)

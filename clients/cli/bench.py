@@ -133,6 +133,41 @@ def next_view(
 
 
 @app.command()
+def load(
+    robots: Annotated[list[int], typer.Option(help="Robots at once; may be repeated.")] = [1, 2, 4, 8, 16, 32],  # noqa: B006
+    seconds: Annotated[float, typer.Option(min=1, help="For each number of robots.")] = 45,
+    views: Annotated[int, typer.Option(min=1, help="Of an observation.")] = 4,
+    data: Annotated[Path | None, typer.Option(help="Folder of recorded objects; the samples of the repository where left out.")] = None,
+    url: Annotated[str | None, typer.Option(help="A service of this machine; one of its own where left out.")] = None,
+    seed: Seed = 0,
+    plot: Annotated[Path | None, typer.Option(help="File for the curves, .png or .svg.")] = None,
+    json: JsonFile = None,
+) -> None:
+    """Throughput, times, queue, refusals and memory of a service that many robots ask at once."""
+    from benchmarks.load import run
+
+    run(json, plot, robots, seconds, views, data, url, seed)
+
+
+@app.command()
+def soak(
+    minutes: Annotated[float, typer.Option(min=0.1, help="How long.")] = 30,
+    robots: Annotated[int, typer.Option(min=1, help="Robots at once.")] = 2,
+    most_growth: Annotated[float, typer.Option(min=0, help="Share by which the settled process may grow; it exits with 1 above.")] = 0.05,
+    views: Annotated[int, typer.Option(min=2, help="Of an observation.")] = 4,
+    data: Annotated[Path | None, typer.Option(help="Folder of recorded objects; the samples of the repository where left out.")] = None,
+    url: Annotated[str | None, typer.Option(help="A service of this machine; one of its own where left out.")] = None,
+    seed: Seed = 0,
+    plot: Annotated[Path | None, typer.Option(help="File for the curves, .png or .svg.")] = None,
+    json: JsonFile = None,
+) -> None:
+    """Whether a service that works for long grows: resident memory, once settled and at the end."""
+    from benchmarks.soak import run
+
+    run(minutes, most_growth, json, plot, robots, views, data, url, seed)
+
+
+@app.command()
 def isolation(
     data: Data,
     source: Annotated[list[str] | None, typer.Option(help="Source of the foreground; may be repeated; all where left out.")] = None,

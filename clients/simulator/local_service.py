@@ -8,10 +8,10 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from types import FrameType
+from types import FrameType, MappingProxyType
 
 import httpx
 
@@ -26,8 +26,10 @@ LOG_LINES = 12
 
 
 @contextmanager
-def local_service(memory: Path, log: Path) -> Iterator[str]:
+def local_service(memory: Path, log: Path, settings: Mapping[str, str] = MappingProxyType({})) -> Iterator[str]:
     """The address of a service that keeps its memory in `memory` and writes to `log`; it is stopped on leaving, however that happens.
+
+    `settings` are variables such as ONELOOK_QUEUE, in place of those of this process.
 
     Raises Unreachable with the end of the log where it does not start.
     """
@@ -35,7 +37,9 @@ def local_service(memory: Path, log: Path) -> Iterator[str]:
     command = [sys.executable, "-m", "clients.cli", "serve", "--host", HOST, "--port", str(port), "--data-dir", str(memory)]
     before = signal.signal(signal.SIGTERM, _leave)
     with log.open("w") as output:
-        process = subprocess.Popen(command, stdout=output, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL, env=_environment())
+        process = subprocess.Popen(
+            command, stdout=output, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL, env={**_environment(), **settings}
+        )
         try:
             _wait(process, address, log)
             yield address

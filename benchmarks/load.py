@@ -1,0 +1,142 @@
+"""Load: 1 to 32 robots that observe at once; what is answered, how fast, what is refused, and what it takes in memory."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from benchmarks.crowd import Errand, Record, crowd, require_loopback
+from benchmarks.load_plot import plot_load
+from benchmarks.parallel import bar
+from benchmarks.tables import print_table, write_json
+from clients.asynchronous import AsyncRobotClient
+from clients.datasets import folders
+from clients.datasets.samples import data_or_samples
+from clients.datasets.sources import find_sequences
+from clients.robot import RobotClient
+from clients.simulator.local_service import local_service
+from core.views import Burst
+
+LEARNT = 3
+"""Categories that the service knows before, so that most observations pass every stage."""
+WARM_UP_S = 2.0
+"""Of one robot alone, not counted."""
+
+
+@dataclass(frozen=True)
+class LoadRow:
+    """So many robots at once."""
+
+    robots: int
+    answered: int
+    per_s: float
+    """Observations answered a second."""
+    p50_s: float
+    p95_s: float
+    p99_s: float
+    """From sending an observation to its answer; of the answered ones."""
+    refused: int
+    """503 with Retry-After, which the robots heeded."""
+    failed: int
+    waiting_mean: float
+    waiting_max: float
+    """Requests in the queue."""
+    resident_mb: float
+    """Of the service, at most."""
+
+
+COLUMNS = tuple(field.name for field in fields(LoadRow))
+
+
+def run(
+    json: Path | None,
+    plot: Path | None = None,
+    robots: Sequence[int] = (1, 2, 4, 8, 16, 32),
+    seconds: float = 45.0,
+    views: int = 4,
+    data: Path | None = None,
+    url: str | None = None,
+    seed: int = 0,
+) -> list[LoadRow]:
+    """A row for each number of robots; prints a table.
+
+    The service is one of its own with an empty memory, unless `url` names one on this machine. Raises InvalidInput for one elsewhere.
+    """
+    sequences = find_sequences(data_or_samples(data))
+    with ExitStack() as open_:
+        if url is None:
+            folder = Path(open_.enter_context(TemporaryDirectory()))
+            url = open_.enter_context(local_service(folder / "memory", folder / "log"))
+        require_loopback(url)
+        teach(url, sequences)
+        errand = observing([folders.load_burst(each, range(views)) for each in sequences])
+        rows = [load_row(count, seconds, record) for count, record in _levels(url, robots, seconds, errand, seed)]
+    if json is not None:
+        write_json(json, {"benchmark": "load", "seconds": seconds, "views": views, "seed": seed}, [asdict(row) for row in rows])
+    if plot is not None:
+        plot_load(plot, rows, f"{views} views an observation, {seconds:.0f} s each")
+    print_table(f"Load, {views} views an observation, {seconds:.0f} s each", [asdict(row) for row in rows], COLUMNS)
+    return rows
+
+
+def _levels(url: str, robots: Sequence[int], seconds: float, errand: Errand, seed: int) -> list[tuple[int, Record]]:
+    found = []
+    with bar() as progress:
+        task = progress.add_task("robots", total=len(robots) * seconds)
+        asyncio.run(crowd(url, 1, WARM_UP_S, errand, seed=seed, tell=lambda record: None))
+        for index, count in enumerate(robots):
+            progress.update(task, description=f"{count} robots")
+
+            def tell(record: Record, before: float = index * seconds) -> None:
+                progress.update(task, completed=before + min(seconds, record.samples[-1].time_s))
+
+            found.append((count, asyncio.run(crowd(url, count, seconds, errand, seed=seed, tell=tell))))
+    return found
+
+
+def load_row(robots: int, seconds: float, record: Record) -> LoadRow:
+    """What a crowd lived through in one line; the rate is over the time until the last one ended its errand."""
+    answered = [attempt.seconds for attempt in record.of("answered")]
+    p50, p95, p99 = np.percentile(answered, (50, 95, 99)).tolist() if answered else (float("nan"),) * 3
+    took = max([seconds, *(attempt.ended_s for attempt in record.attempts)])
+    waiting = [sample.waiting for sample in record.samples]
+    return LoadRow(
+        robots,
+        len(answered),
+        len(answered) / took,
+        p50,
+        p95,
+        p99,
+        len(record.of("refused")),
+        len(record.of("failed")),
+        float(np.mean(waiting)),
+        max(waiting),
+        max(sample.resident_mb for sample in record.samples),
+    )
+
+
+def teach(url: str, sequences: Sequence[folders.Sequence]) -> None:
+    """Makes a category of each of the first objects of different kinds."""
+    firsts = [group[0] for group in folders.by_category(list(sequences)).values()][:LEARNT]
+    with RobotClient(url) as robot:
+        for sequence in firsts:
+            burst = folders.load_burst(sequence, range(min(8, len(sequence.images))))
+            scan = robot.scan(burst)
+            for view in burst.views:
+                scan.add(view)
+            scan.complete(sequence.category)
+
+
+def observing(bursts: Sequence[Burst]) -> Errand:
+    """Looks at one of these, and learns nothing from it."""
+
+    async def errand(robot: AsyncRobotClient, rng: np.random.Generator) -> None:
+        await robot.observe(bursts[int(rng.integers(len(bursts)))], learn=False)
+
+    return errand

@@ -1,0 +1,78 @@
+"""The pictures of load and soak."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import matplotlib
+
+from benchmarks.crowd import FATES
+
+if TYPE_CHECKING:
+    from benchmarks.crowd import Record
+    from benchmarks.load import LoadRow
+
+SIZE = (12, 3.8)
+DPI = 110
+
+
+def plot_load(file: Path, rows: Sequence[LoadRow], title: str) -> None:
+    """Against the number of robots: what is answered and refused a second, how long an answer takes, queue and memory."""
+    figure, (rate, times, inside) = _panels(3)
+    robots = [row.robots for row in rows]
+    took = [row.answered / row.per_s if row.per_s else float("nan") for row in rows]
+    rate.plot(robots, [row.per_s for row in rows], "o-", label="answered")
+    rate.plot(robots, [row.refused / seconds for row, seconds in zip(rows, took)], "o--", label="refused (503, told when to come back)")
+    rate.plot(robots, [row.failed / seconds for row, seconds in zip(rows, took)], "x:", color="tab:red", label="failed")
+    rate.set(ylabel="observations a second", ylim=(0, None))
+    for name in ("p50_s", "p95_s", "p99_s"):
+        times.plot(robots, [getattr(row, name) for row in rows], "o-", label=name.removesuffix("_s"))
+    times.set(ylabel="seconds to an answer", ylim=(0, None))
+    inside.plot(robots, [row.waiting_mean for row in rows], "o-", label="waiting, mean")
+    inside.plot(robots, [row.waiting_max for row in rows], "o--", label="waiting, most")
+    inside.set(ylabel="requests", ylim=(0, None))
+    memory = inside.twinx()
+    memory.plot(robots, [row.resident_mb for row in rows], "s-", color="tab:green", label="resident memory")
+    memory.set(ylabel="MB", ylim=(0, None))
+    for panel in (rate, times, inside):
+        panel.set_xscale("log", base=2)
+        panel.set_xticks(robots, [str(each) for each in robots])
+        panel.set(xlabel="robots at once")
+        panel.legend(fontsize=8, loc="upper left")
+    memory.legend(fontsize=8, loc="lower right")
+    _save(figure, file, title)
+
+
+def plot_soak(file: Path, record: Record, title: str) -> None:
+    """Resident memory over time, and what was answered in each part of it."""
+    figure, (memory, answers) = _panels(2)
+    memory.plot([sample.time_s / 60 for sample in record.samples], [sample.resident_mb for sample in record.samples])
+    memory.set(xlabel="minutes", ylabel="resident memory, MB", ylim=(0, None))
+    answered = record.of("answered")
+    answers.plot([each.ended_s / 60 for each in answered], [each.seconds for each in answered], ".", markersize=3, label="answered")
+    for fate, colour in zip(FATES[1:], ("tab:orange", "tab:red")):
+        others = record.of(fate)
+        answers.plot(
+            [each.ended_s / 60 for each in others], [each.seconds for each in others], "x", color=colour, label=f"{fate} ({len(others)})"
+        )
+    answers.set(xlabel="minutes", ylabel="seconds of an errand", ylim=(0, None))
+    answers.legend(fontsize=8)
+    _save(figure, file, title)
+
+
+def _panels(count: int) -> tuple[Any, Any]:
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+
+    return pyplot.subplots(1, count, figsize=SIZE, constrained_layout=True)
+
+
+def _save(figure: Any, file: Path, title: str) -> None:
+    from matplotlib import pyplot
+
+    file.parent.mkdir(parents=True, exist_ok=True)
+    figure.suptitle(title, fontsize=10)
+    figure.savefig(file, dpi=DPI)
+    pyplot.close(figure)

@@ -1,0 +1,134 @@
+"""Soak: a few robots that live with a service for long, while its memory stays as large as it is; does the process grow?"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from benchmarks.crowd import FATES, Errand, Record, Sample, crowd, require_loopback
+from benchmarks.load import teach
+from benchmarks.load_plot import plot_soak
+from benchmarks.parallel import bar
+from benchmarks.tables import print_table, write_json
+from clients.asynchronous import AsyncRobotClient
+from clients.datasets import folders
+from clients.datasets.samples import data_or_samples
+from clients.datasets.sources import find_sequences
+from clients.simulator.local_service import local_service
+from core.errors import InvalidInput
+from core.views import Burst
+
+OBSERVE, LEARN = 0.85, 0.93
+"""Of the errands: up to the first observes, up to the second learns a category and forgets it again, the rest looks through the memory."""
+SETTLED = 1 / 3
+"""Of the time: until then allocators and caches fill."""
+PART = 1 / 6
+"""Of the time, whose median is compared at either end of the rest."""
+SETTINGS = {"ONELOOK_KEEP_OBSERVATIONS": "50", "ONELOOK_UNDO_DAYS": "0"}
+"""So that what is kept is bounded soon, as a service of years is."""
+SAMPLES_OF_A_RUN = 600
+
+
+@dataclass(frozen=True)
+class SoakResult:
+    """One soak."""
+
+    minutes: float
+    robots: int
+    answered: int
+    refused: int
+    failed: int
+    early_mb: float
+    """Resident memory once it has settled."""
+    late_mb: float
+    """At the end."""
+    growth: float
+    """Share of the first by which the second is larger."""
+
+
+def run(
+    minutes: float,
+    most_growth: float,
+    json: Path | None = None,
+    plot: Path | None = None,
+    robots: int = 2,
+    views: int = 4,
+    data: Path | None = None,
+    url: str | None = None,
+    seed: int = 0,
+) -> SoakResult:
+    """Prints one line; raises InvalidInput where anything failed or the process grew by more than the share `most_growth`.
+
+    The service is as in `load.run`.
+    """
+    sequences = find_sequences(data_or_samples(data))
+    with ExitStack() as open_:
+        if url is None:
+            folder = Path(open_.enter_context(TemporaryDirectory()))
+            url = open_.enter_context(local_service(folder / "memory", folder / "log", SETTINGS))
+        require_loopback(url)
+        teach(url, sequences)
+        errand = living([folders.load_burst(each, range(views)) for each in sequences])
+        record = _soak(url, robots, 60 * minutes, errand, seed)
+    result = soak_result(minutes, robots, record)
+    if json is not None:
+        write_json(json, {"benchmark": "soak", "seed": seed, **asdict(result)}, [asdict(sample) for sample in record.samples])
+    if plot is not None:
+        plot_soak(
+            plot, record, f"{robots} robots, {minutes:g} minutes: {result.early_mb:.0f} MB once settled, {result.late_mb:.0f} MB at the end"
+        )
+    print_table("Soak", [asdict(result)], list(asdict(result)))
+    if failed := record.of("failed"):
+        raise InvalidInput("failed", f"{len(failed)} errands failed, the first with: {failed[0].why}")
+    if result.growth > most_growth:
+        raise InvalidInput("growth", f"the process grew by {100 * result.growth:.1f} %, {100 * most_growth:.1f} % are allowed")
+    return result
+
+
+def _soak(url: str, robots: int, seconds: float, errand: Errand, seed: int) -> Record:
+    with bar() as progress:
+        task = progress.add_task("soaking", total=seconds)
+
+        def tell(record: Record) -> None:
+            progress.update(task, completed=min(seconds, record.samples[-1].time_s))
+
+        return asyncio.run(crowd(url, robots, seconds, errand, seed=seed, sample_s=seconds / SAMPLES_OF_A_RUN, tell=tell))
+
+
+def soak_result(minutes: float, robots: int, record: Record) -> SoakResult:
+    """Compares the time after it settled with the end."""
+    end = record.samples[-1].time_s
+    early = _median(record.samples, SETTLED * end, (SETTLED + PART) * end)
+    late = _median(record.samples, (1 - PART) * end, end)
+    answered, refused, failed = (len(record.of(fate)) for fate in FATES)
+    return SoakResult(minutes, robots, answered, refused, failed, early, late, late / early - 1)
+
+
+def _median(samples: Sequence[Sample], begin_s: float, end_s: float) -> float:
+    return float(np.median([sample.resident_mb for sample in samples if begin_s <= sample.time_s <= end_s]))
+
+
+def living(bursts: Sequence[Burst]) -> Errand:
+    """Mostly looks; now and then learns a category and forgets it, or looks through what is there."""
+
+    async def errand(robot: AsyncRobotClient, rng: np.random.Generator) -> None:
+        burst, chance = bursts[int(rng.integers(len(bursts)))], rng.random()
+        if chance < OBSERVE:
+            await robot.observe(burst, learn=False)
+        elif chance < LEARN:
+            scan = await robot.scan(burst)
+            for view in burst.views:
+                await scan.add(view)
+            await robot.forget((await scan.complete("passing")).id)
+        else:
+            (latest,) = await robot.observations(limit=1)
+            await robot.picture(f"/v1/observations/{latest.id}/overlay.png")
+            await robot.categories()
+
+    return errand
