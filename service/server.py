@@ -1,25 +1,30 @@
-"""The server around the application: how it starts to listen, and how it ends."""
+"""The server around the application, and how it ends."""
 
 from __future__ import annotations
 
+import asyncio
 import socket
 
 import uvicorn
 from fastapi import FastAPI
 
-GRACE_S = 30
-"""For answers under way, once it shall stop: about the longest that one takes on a small machine."""
+GRACE_S = 10
+"""For answers to go out, once what was worked on is finished."""
+POLL_S = 0.05
 
 
 class Server(uvicorn.Server):
-    """Told to stop, it finishes what is worked on; what waits is sent away, and listeners are not waited for."""
+    """Told to stop, it finishes what is worked on, sends away what waits, and does not wait for listeners; a second Ctrl+C ends it at once."""
 
     def __init__(self, app: FastAPI) -> None:
         super().__init__(uvicorn.Config(app, log_config=None, access_log=False, timeout_graceful_shutdown=GRACE_S))
         self._app = app
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
-        """Uvicorn's, after the application was told."""
-        self._app.state.work.stop()
-        self._app.state.agent.events.close()
+        """Uvicorn's, which cancels what takes longer than the grace; so work comes first."""
+        state = self._app.state
+        state.work.stop()
+        state.agent.events.close()
+        while state.work.running and not self.force_exit:
+            await asyncio.sleep(POLL_S)
         await super().shutdown(sockets)
