@@ -14,7 +14,7 @@ POLL_S = 0.05
 
 
 class Server(uvicorn.Server):
-    """Told to stop, it finishes what is worked on, sends away what waits, and does not wait for listeners; a second Ctrl+C ends it at once."""
+    """Told to stop, it finishes what is worked on and sends away what waits; a second Ctrl+C ends it at once."""
 
     def __init__(self, app: FastAPI) -> None:
         super().__init__(uvicorn.Config(app, log_config=None, access_log=False, timeout_graceful_shutdown=GRACE_S))
