@@ -42,7 +42,7 @@ def encode_all(sequences: Sequence[folders.Sequence], encoder: Encoder, folder: 
         task = progress.add_task("encoding", total=len(missing))
         for sequence, file in missing:
             progress.update(task, description=f"encoding {sequence.name}")
-            _write(file, encoder.encode(folders.load_burst(sequence)))
+            write_encoded(file, encoder.encode(folders.load_burst(sequence)))
             progress.advance(task)
     return files
 
@@ -61,6 +61,16 @@ def read_views(file: Path, indices: list[int] | None = None) -> EncodedBurst:
     return agreeing(whole if indices is None else whole.select(indices))
 
 
+def write_encoded(file: Path, encoded: EncodedBurst) -> None:
+    """Keeps what `read_encoded` reads."""
+    arrays: dict[str, NDArray[Any]] = {
+        **burst_as_arrays(encoded),
+        "stages": np.array(list(encoded.stage_ms), dtype=np.str_),
+        "stage_ms": np.array(list(encoded.stage_ms.values()), dtype=float),
+    }
+    write(file, lambda stream: np.savez(stream, allow_pickle=False, **arrays))
+
+
 def _key(sequence: folders.Sequence, encoder: Encoder) -> str:
     digest = hashlib.sha256(f"{encoder.backbone.fingerprint} {encoder.config} {code_hash(SOURCES)}".encode())
     digest.update(sequence.reader.cameras(sequence).encode())
@@ -68,12 +78,3 @@ def _key(sequence: folders.Sequence, encoder: Encoder) -> str:
         if file.exists():
             digest.update(f"{file.relative_to(sequence.path)}\0".encode() + hashlib.sha256(file.read_bytes()).digest())
     return digest.hexdigest()[:32]
-
-
-def _write(file: Path, encoded: EncodedBurst) -> None:
-    arrays: dict[str, NDArray[Any]] = {
-        **burst_as_arrays(encoded),
-        "stages": np.array(list(encoded.stage_ms), dtype=np.str_),
-        "stage_ms": np.array(list(encoded.stage_ms.values()), dtype=float),
-    }
-    write(file, lambda stream: np.savez(stream, allow_pickle=False, **arrays))

@@ -1,4 +1,4 @@
-"""`onelook bench`: accuracy, discovery, speed, isolation and symmetries, each a table and JSON."""
+"""`onelook bench`: accuracy, discovery, speed, isolation, symmetries and robustness, each a table and JSON."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-app = typer.Typer(help="Measure accuracy, discovery, speed, isolation and symmetries.", no_args_is_help=True)
+app = typer.Typer(help="Measure accuracy, discovery, speed, isolation, symmetries and robustness.", no_args_is_help=True)
 
 Data = Annotated[Path, typer.Option(help="Recorded objects: a folder in the data layout, or bop:, co3d:, transforms: or images:FOLDER.")]
 JsonFile = Annotated[Path | None, typer.Option("--json", help='File for {"meta": …, "rows": …}.')]
@@ -193,3 +193,21 @@ def symmetries(
     from benchmarks.symmetries import run
 
     run(data, json, views, limit, backbone)
+
+
+@app.command()
+def robustness(
+    data: Data,
+    views: Annotated[str, typer.Option(help="Views of what the memory holds and of the degraded burst: 8, 10+6 or all.")] = "8",
+    limit: Annotated[int | None, typer.Option(min=1, help="Degraded objects a category at most; all others are references.")] = None,
+    degradation: Annotated[list[str] | None, typer.Option(help='Such as "motion blur"; may be repeated; all where left out.')] = None,
+    poses: Annotated[bool, typer.Option(help="Verify decisions by pose, as the service does.")] = True,
+    plot: Annotated[Path | None, typer.Option(help="Folder for the curves.")] = None,
+    seed: Seed = 0,
+    backbone: Backbone = BACKBONE,
+    json: JsonFile = None,
+) -> None:
+    """How much worse sensors and places may get; goes on where it was interrupted."""
+    from benchmarks.robustness import run
+
+    run(data, json, plot, views, limit, degradation or [], seed, backbone, poses)

@@ -1,0 +1,265 @@
+"""How much worse sensors and places may get: pose accuracy and decisions against the strength of each degradation.
+
+Only the target burst, the robot's, is degraded; what the memory holds is clean. One encoding of a degraded burst serves its poses, against
+other objects of its kind, and its decision, against all other objects. Encodings and poses are cached, so that an interrupted run goes on
+where it stopped. Silhouettes only place occluders and clutter; the product finds the object by itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from zlib import crc32
+
+import numpy as np
+
+from benchmarks.clean_memory import UNSEEN, Decisions, Known, decide_by, lay
+from benchmarks.degradations.catalogue import CLUTTER, Degradation, catalogue
+from benchmarks.degraded import Remembering, encode_degraded, masked_views
+from benchmarks.encoded import encode_all
+from benchmarks.pair_scores import auroc
+from benchmarks.pairs import ViewCounts, choose_views
+from benchmarks.parallel import map_jobs
+from benchmarks.robustness_plot import plot
+from benchmarks.tables import Row, print_table, write_json
+from clients.datasets import folders
+from clients.datasets.sources import find_sequences
+from clients.pose_error import NO_POSE, PoseError, accuracy, median, pose_error
+from core.backbones.base import Backbone
+from core.backbones.dino import load_backbone
+from core.encode import Encoder
+from core.errors import InvalidInput, NoObject
+from core.sim3 import Sim3
+from core.views import View
+
+CLEAN = "none"
+"""The name of no degradation."""
+REFERENCES = 3
+"""Other objects of its kind that a degraded one is posed against, at most."""
+FALL = 10.0
+"""Points that a figure may lose before it counts as broken."""
+FIGURES = ("acc30", "right")
+"""Those that may break."""
+COLUMNS = ("degradation", "strength", "acc30", "acc15", "median_deg", "right", "uncertain", "nearest", "auroc", "false_known")
+BREAKS = ("degradation", "unit", *(f"{figure}_breaks_at" for figure in FIGURES))
+
+
+@dataclass(frozen=True)
+class Recordings:
+    """All clean bursts."""
+
+    sequences: tuple[folders.Sequence, ...]
+    files: tuple[Path, ...]
+    """Their encodings."""
+    views: ViewCounts
+    seed: int
+    backbone: str
+    poses: bool
+    """Whether poses verify decisions."""
+
+    def chosen(self, index: int, role: str) -> tuple[int, ...]:
+        """The views that stand for a sequence as `reference` or `target`."""
+        sequence, count = self.sequences[index], self.views.target if role == "target" else self.views.reference
+        return tuple(choose_views(sequence.name, role, len(sequence.images), count, self.seed))
+
+    def known(self, index: int) -> Known:
+        """A sequence as the memory holds it."""
+        return Known(self.sequences[index].category, self.files[index], self.chosen(index, "reference"))
+
+    def things(self, index: int) -> list[int]:
+        """Sequences of other categories than that of a sequence."""
+        return [other for other, each in enumerate(self.sequences) if each.category != self.sequences[index].category]
+
+
+@dataclass(frozen=True)
+class Job:
+    """One target under some degradations, all strengths of each."""
+
+    recordings: Recordings
+    target: int
+    references: tuple[int, ...]
+    degradations: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of one degraded burst."""
+
+    degradation: str
+    strength: float
+    errors: tuple[PoseError, ...]
+    """Of its pose against each reference."""
+    decisions: Decisions
+
+
+def run(
+    data: Path,
+    json: Path | None,
+    picture: Path | None,
+    views: str = "8",
+    limit: int | None = None,
+    degradations: Sequence[str] = (),
+    seed: int = 0,
+    backbone: str = "dinov2-s14",
+    poses: bool = True,
+) -> list[Row]:
+    """Degrades up to `limit` objects a category of `data`; prints and returns a row for each strength, and one for each degradation.
+
+    Args:
+        picture: folder for the curves.
+        degradations: names of those that are tried; all where there are none.
+        poses: whether poses verify decisions, as in the service.
+
+    Raises InvalidInput for an unknown degradation, or data without two objects of a kind, ground truth, depth or enough views.
+    """
+    listed = [each for each in catalogue([]) if not degradations or each.name in degradations]
+    unknown = set(degradations) - {each.name for each in listed}
+    if unknown:
+        known = ", ".join(each.name for each in catalogue([]))
+        raise InvalidInput("degradation", f"{', '.join(sorted(unknown))} is none of {known}")
+    network = load_backbone(backbone)
+    sequences = tuple(find_sequences(data))
+    recordings = Recordings(sequences, tuple(encode_all(sequences, Encoder(network))), ViewCounts.parse(views), seed, backbone, poses)
+    jobs = plan(recordings, limit, listed)
+    outcomes = [outcome for outcomes in map_jobs(work, jobs, lambda job: len(job.degradations), "degrading") for outcome in outcomes]
+    rows = table_rows(listed, outcomes)
+    if json is not None:
+        meta = {
+            "benchmark": "robustness",
+            "data": data,
+            "seed": seed,
+            "views": views,
+            "limit": limit,
+            "poses": poses,
+            "backbone": network.name,
+            "fingerprint": network.fingerprint,
+        }
+        write_json(json, meta, rows)
+    if picture is not None:
+        plot(picture, rows)
+    print_table(f"Robustness, {data}", [row for row in rows if "acc30" in row], COLUMNS)
+    print_table(f"Where {FALL:.0f} points are lost", [row for row in rows if "acc30" not in row], BREAKS)
+    return rows
+
+
+def plan(recordings: Recordings, limit: int | None, degradations: Sequence[Degradation]) -> list[Job]:
+    """For each target a job for all that leaves the picture as it is, and one for each other degradation; one target a category first.
+
+    A smaller limit takes a prefix of a larger one's.
+    """
+    geometric = tuple(each.name for each in degradations if not each.repaints)
+    groups = [(CLEAN, *geometric), *((each.name,) for each in degradations if each.repaints)]
+    ranked: list[tuple[int, int, tuple[int, ...]]] = []
+    for category in sorted({sequence.category for sequence in recordings.sequences}):
+        members = [index for index, sequence in enumerate(recordings.sequences) if sequence.category == category]
+        order = np.random.default_rng([recordings.seed, crc32(category.encode())]).permutation(members).tolist()
+        for rank, target in enumerate(order[:limit] if len(order) > 1 else []):
+            others = (order[rank + 1 :] + order[:rank])[:REFERENCES]
+            ranked.append((rank, target, tuple(others)))
+    if not ranked:
+        raise InvalidInput("data", "no category has two instances, so there is no pair to estimate")
+    _require(recordings, [index for _, target, others in ranked for index in (target, *others)])
+    return [Job(recordings, target, others, group) for _, target, others in sorted(ranked) for group in groups]
+
+
+def work(job: Job) -> list[Outcome]:
+    """Degrades, encodes, poses and decides."""
+    recordings = job.recordings
+    encoder = Encoder(Remembering(backbone_named(recordings.backbone)))
+    name = recordings.sequences[job.target].name
+    views = _masked(recordings, job.target, recordings.chosen(job.target, "target"))
+    things = [_masked(recordings, other, [0])[0] for other in recordings.things(job.target)] if CLUTTER in job.degradations else []
+    worse: list[tuple[str, float, list[View]]] = [(CLEAN, 0.0, views)] if CLEAN in job.degradations else []
+    for each in catalogue(things):
+        if each.name in job.degradations:
+            worse += [(each.name, strength, each.degrade(views, strength, name, recordings.seed)) for strength in each.strengths]
+    return [Outcome(kind, strength, *judge(job, degraded, encoder)) for kind, strength, degraded in worse]
+
+
+def judge(job: Job, views: Sequence[View], encoder: Encoder) -> tuple[tuple[PoseError, ...], Decisions]:
+    """Errors of the pose against each of the job's references, and the decision; where no object is found there is neither."""
+    recordings, whitening = job.recordings, encoder.backbone.whitening
+    try:
+        file = encode_degraded(views, encoder)
+    except NoObject:
+        return (NO_POSE,) * len(job.references), UNSEEN
+    sequence = recordings.sequences[job.target]
+    errors = []
+    for other in job.references:
+        found = lay(recordings.known(other), file, whitening, recordings.seed).target_from_reference
+        errors.append(NO_POSE if found is None else _error(found, recordings.sequences[other], sequence))
+    memory = [recordings.known(other) for other in range(len(recordings.sequences)) if other != job.target]
+    decisions = decide_by(memory, sequence.category, file, whitening, recordings.seed, poses=recordings.poses)
+    return tuple(errors), decisions
+
+
+def table_rows(degradations: Sequence[Degradation], outcomes: Sequence[Outcome]) -> list[Row]:
+    """A row for what is clean and for each strength, then one for each degradation: where it breaks."""
+    by_setting: dict[tuple[str, float], list[Outcome]] = {}
+    for outcome in outcomes:
+        by_setting.setdefault((outcome.degradation, outcome.strength), []).append(outcome)
+    clean = figures(by_setting[CLEAN, 0.0])
+    rows: list[Row] = [{"degradation": CLEAN, "strength": 0.0, **clean}]
+    breaks: list[Row] = []
+    for each in degradations:
+        curve = [figures(by_setting[each.name, strength]) for strength in each.strengths]
+        rows += [{"degradation": each.name, "strength": strength, **row} for strength, row in zip(each.strengths, curve)]
+        places = [each.none, *each.strengths]
+        found = {f"{figure}_breaks_at": breaks_at(places, [row[figure] for row in (clean, *curve)]) for figure in FIGURES}
+        breaks.append({"degradation": each.name, "unit": each.unit, "none": each.none, **found})
+    return rows + breaks
+
+
+def figures(outcomes: Sequence[Outcome]) -> dict[str, float]:
+    """Of all bursts at one strength, in percent and degrees; AUROC: evidence for the own category against that for the best wrong one."""
+    errors = [error for outcome in outcomes for error in outcome.errors]
+    decisions = [outcome.decisions for outcome in outcomes]
+    shares = {
+        name: 100 * float(np.mean([getattr(each, name) for each in decisions]))
+        for name in ("right", "uncertain", "novel", "nearest", "false_known")
+    }
+    return {
+        "bursts": len(outcomes),
+        "pairs": len(errors),
+        "acc30": accuracy(errors, 30),
+        "acc15": accuracy(errors, 15),
+        "median_deg": median(errors, "rotation_deg"),
+        **shares,
+        "auroc": auroc(np.array([each.own for each in decisions]), np.array([each.rival for each in decisions])),
+    }
+
+
+def breaks_at(strengths: Sequence[float], values: Sequence[float]) -> float | None:
+    """The strength at which a figure first is FALL below its first value, on straight lines between what was measured, if it is."""
+    limit = values[0] - FALL
+    for low, high, before, after in zip(strengths, strengths[1:], values, values[1:]):
+        if after <= limit:
+            return float(low + (high - low) * (before - limit) / (before - after))
+    return None
+
+
+@cache
+def backbone_named(name: str) -> Backbone:
+    """Loaded once a process."""
+    return load_backbone(name)
+
+
+def _error(estimate: Sim3, reference: folders.Sequence, target: folders.Sequence) -> PoseError:
+    assert reference.world_from_model, "plan requires ground truth"
+    assert target.world_from_model, "plan requires ground truth"
+    return pose_error(estimate, reference.world_from_model, target.world_from_model, target.symmetries)
+
+
+def _masked(recordings: Recordings, index: int, indices: Sequence[int]) -> list[View]:
+    return masked_views(recordings.sequences[index], recordings.files[index], indices)
+
+
+def _require(recordings: Recordings, indices: Sequence[int]) -> None:
+    most = max(recordings.views.reference or 0, recordings.views.target or 0)
+    for sequence in (recordings.sequences[index] for index in indices):
+        if sequence.world_from_model is None:
+            raise InvalidInput(str(sequence.path), "has no true pose (scene_gt.json), which poses are scored against")
+        if len(sequence.images) < most:
+            raise InvalidInput("views", f"{most} were asked for, but {sequence.name} has {len(sequence.images)}; ask for fewer")

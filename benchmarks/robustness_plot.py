@@ -1,0 +1,56 @@
+"""The curves of the robustness benchmark, one small picture for each degradation, all in one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+
+from benchmarks.tables import Row
+
+FILE = "robustness.png"
+COLUMNS = 4
+LINES = {
+    "acc30": ("pose within 30°", "o-", "pairs"),
+    "right": ("known, and as what it is", "s-", "bursts"),
+    "false_known": ("novel, called known", "^:", "bursts"),
+}
+"""Of each figure its name, its style, and what its percentages are of."""
+
+
+def plot(folder: Path, rows: Sequence[Row]) -> Path:
+    """Writes FILE below `folder`: percentages with one standard error, the undegraded first."""
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+
+    clean, breaks = rows[0], [row for row in rows if "acc30" not in row]
+    down = -(-len(breaks) // COLUMNS)
+    figure, grid = pyplot.subplots(down, COLUMNS, figsize=(3.5 * COLUMNS, 2.9 * down), sharey=True, squeeze=False, constrained_layout=True)
+    for axes, about in zip(grid.flat, breaks):
+        curve = [clean, *(row for row in rows if row["degradation"] == about["degradation"] and "acc30" in row)]
+        _draw(axes, curve)
+        labels = [about["none"], *(row["strength"] for row in curve[1:])]
+        axes.set(title=about["degradation"], xlabel=about["unit"], ylim=(-3, 103), xticks=range(len(curve)))
+        axes.set_xticklabels([f"{label:g}" for label in labels])
+    for axes in grid.flat[len(breaks) :]:
+        axes.axis("off")
+    for axes in grid[:, 0]:
+        axes.set_ylabel("%")
+    figure.legend(*grid[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=len(LINES))
+    folder.mkdir(parents=True, exist_ok=True)
+    figure.savefig(folder / FILE, dpi=110)
+    pyplot.close(figure)
+    return folder / FILE
+
+
+def _draw(axes: Any, curve: Sequence[Row]) -> None:
+    for figure, (label, style, of) in LINES.items():
+        share = np.array([row[figure] for row in curve], dtype=float)
+        count = np.array([row[of] for row in curve], dtype=float)
+        error = np.sqrt(share * (100 - share) / count)
+        (line,) = axes.plot(share, style, markersize=4, label=label)
+        axes.fill_between(range(len(curve)), share - error, share + error, color=line.get_color(), alpha=0.15, linewidth=0)
+    axes.grid(alpha=0.3)
