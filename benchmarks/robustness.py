@@ -40,9 +40,9 @@ REFERENCES = 3
 """Other objects of its kind that a degraded one is posed against, at most."""
 FALL = 10.0
 """Points that a figure may lose before it counts as broken."""
-FIGURES = ("acc30", "right")
-"""Those that may break."""
-COLUMNS = ("degradation", "strength", "acc30", "acc15", "median_deg", "right", "uncertain", "nearest", "auroc", "false_known")
+FIGURES = ("acc30", "auroc")
+"""Those that may break: of poses and of decisions."""
+COLUMNS = ("degradation", "strength", "acc30", "acc15", "median_deg", "auroc", "nearest", "right", "uncertain", "false_known")
 BREAKS = ("degradation", "unit", *(f"{figure}_breaks_at" for figure in FIGURES))
 
 
@@ -213,7 +213,7 @@ def table_rows(degradations: Sequence[Degradation], outcomes: Sequence[Outcome])
 
 
 def figures(outcomes: Sequence[Outcome]) -> dict[str, float]:
-    """Of all bursts at one strength, in percent and degrees; AUROC: evidence for the own category against that for the best wrong one."""
+    """Of all bursts at one strength, percent and degrees; AUROC is of evidence for the own category against that for the best wrong one."""
     errors = [error for outcome in outcomes for error in outcome.errors]
     decisions = [outcome.decisions for outcome in outcomes]
     shares = {
@@ -227,17 +227,18 @@ def figures(outcomes: Sequence[Outcome]) -> dict[str, float]:
         "acc15": accuracy(errors, 15),
         "median_deg": median(errors, "rotation_deg"),
         **shares,
-        "auroc": auroc(np.array([each.own for each in decisions]), np.array([each.rival for each in decisions])),
+        "auroc": 100 * auroc(np.array([each.own for each in decisions]), np.array([each.rival for each in decisions])),
     }
 
 
 def breaks_at(strengths: Sequence[float], values: Sequence[float]) -> float | None:
-    """The strength at which a figure first is FALL below its first value, on straight lines between what was measured, if it is."""
+    """The strength from which on a figure stays FALL below its first value, on straight lines between what was measured, if any."""
     limit = values[0] - FALL
-    for low, high, before, after in zip(strengths, strengths[1:], values, values[1:]):
-        if after <= limit:
-            return float(low + (high - low) * (before - limit) / (before - after))
-    return None
+    last = max(index for index, value in enumerate(values) if value > limit)
+    if last == len(values) - 1:
+        return None
+    share = (values[last] - limit) / (values[last] - values[last + 1])
+    return float(strengths[last] + share * (strengths[last + 1] - strengths[last]))
 
 
 @cache

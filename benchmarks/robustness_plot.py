@@ -14,15 +14,15 @@ from benchmarks.tables import Row
 FILE = "robustness.png"
 COLUMNS = 4
 LINES = {
-    "acc30": ("pose within 30°", "o-", "pairs"),
-    "right": ("known, and as what it is", "s-", "bursts"),
-    "false_known": ("novel, called known", "^:", "bursts"),
+    "acc30": ("pose within 30°, %", "o-", "pairs"),
+    "auroc": ("own kind known from not, AUROC × 100", "s-", None),
+    "nearest": ("most similar kind is the right one, %", "^:", "bursts"),
 }
-"""Of each figure its name, its style, and what its percentages are of."""
+"""Of each figure its name, its style, and what it is a share of."""
 
 
 def plot(folder: Path, rows: Sequence[Row]) -> Path:
-    """Writes FILE below `folder`: percentages with one standard error, the undegraded first."""
+    """Writes FILE below `folder`: the undegraded first; shares with one standard error."""
     matplotlib.use("Agg")
     from matplotlib import pyplot
 
@@ -37,8 +37,6 @@ def plot(folder: Path, rows: Sequence[Row]) -> Path:
         axes.set_xticklabels([f"{label:g}" for label in labels])
     for axes in grid.flat[len(breaks) :]:
         axes.axis("off")
-    for axes in grid[:, 0]:
-        axes.set_ylabel("%")
     figure.legend(*grid[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=len(LINES))
     folder.mkdir(parents=True, exist_ok=True)
     figure.savefig(folder / FILE, dpi=110)
@@ -48,9 +46,9 @@ def plot(folder: Path, rows: Sequence[Row]) -> Path:
 
 def _draw(axes: Any, curve: Sequence[Row]) -> None:
     for figure, (label, style, of) in LINES.items():
-        share = np.array([row[figure] for row in curve], dtype=float)
-        count = np.array([row[of] for row in curve], dtype=float)
-        error = np.sqrt(share * (100 - share) / count)
-        (line,) = axes.plot(share, style, markersize=4, label=label)
-        axes.fill_between(range(len(curve)), share - error, share + error, color=line.get_color(), alpha=0.15, linewidth=0)
+        values = np.array([row[figure] for row in curve], dtype=float)
+        (line,) = axes.plot(values, style, markersize=4, label=label)
+        if of is not None:
+            error = np.sqrt(values * (100 - values) / np.array([row[of] for row in curve], dtype=float))
+            axes.fill_between(range(len(curve)), values - error, values + error, color=line.get_color(), alpha=0.15, linewidth=0)
     axes.grid(alpha=0.3)

@@ -117,12 +117,13 @@ def test_figures_of_known_outcomes() -> None:
     found = figures([Outcome("x", 1, (right, wrong), KNOWN), Outcome("x", 1, (right, right), MISSED)])
     assert (found["acc30"], found["acc15"], found["median_deg"], found["pairs"], found["bursts"]) == (75, 75, 10, 4, 2)
     assert (found["right"], found["nearest"], found["novel"], found["false_known"]) == (50, 50, 50, 50)
-    assert found["auroc"] == 0.5  # 2 is above both rivals, 0 above none
+    assert found["auroc"] == 50  # 2 is above both rivals, 0 above none
 
 
 def test_where_a_figure_breaks_is_read_off_straight_lines() -> None:
     assert breaks_at([0, 10, 20], [90, 85, 75]) == pytest.approx(15)
-    assert breaks_at([1, 2, 4], [90, 60, 95]) == pytest.approx(4 / 3)
+    assert breaks_at([1, 2, 4], [90, 60, 95]) is None  # a dip
+    assert breaks_at([1, 2, 4], [90, 60, 20]) == pytest.approx(4 / 3)
     assert breaks_at([95, 50, 20], [90, 90, 70]) == pytest.approx(35)
     assert breaks_at([0, 10], [90, 81]) is None
 
@@ -134,7 +135,7 @@ def test_rows_say_where_each_degradation_breaks() -> None:
     outcomes += [Outcome(noise.name, strength, bad if strength > 10 else good, KNOWN) for strength in noise.strengths]
     *_, last = table_rows([noise], outcomes)
     assert last["acc30_breaks_at"] == pytest.approx(11)
-    assert last["right_breaks_at"] is None
+    assert last["auroc_breaks_at"] is None
 
 
 def test_what_does_not_exist_is_refused(recorded: Path) -> None:
