@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from core.errors import Unavailable
-from store.folders import Files, FileSum
+from store.folders import Files, FileSum, read_whole
 
 Array = NDArray[Any]
 BLOB_TYPE = np.dtype("<f4")
@@ -29,15 +28,8 @@ def write_arrays(path: Path, arrays: Mapping[str, Array]) -> str:
 
 
 def read_arrays(path: Path, sha256: str) -> dict[str, Array]:
-    """The arrays of one npz file. Raises Unavailable where it is missing or is not what was written."""
-    try:
-        content = path.read_bytes()
-    except FileNotFoundError:
-        raise Unavailable(f"{path} is missing from the memory; restore it from a backup") from None
-    found = FileSum.of(content).sha256
-    if found != sha256:
-        raise Unavailable(f"{path} is damaged: its SHA-256 is {found[:12]}…, {sha256[:12]}… was written; restore it from a backup")
-    with np.load(io.BytesIO(content), allow_pickle=False) as npz:
+    """The arrays of one npz file. Raises as `read_whole` does."""
+    with np.load(io.BytesIO(read_whole(path, sha256)), allow_pickle=False) as npz:
         return dict(npz)
 
 

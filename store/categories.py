@@ -145,8 +145,7 @@ class Categories:
 
     def reference(self, category_id: str) -> Reference:
         """Raises NotFound, and Unavailable where its file is damaged."""
-        rows = self._connection.rows("SELECT files FROM categories WHERE id = ?", self.get(category_id).id)
-        name, file = arrays_file(files_from_json(rows[0]["files"]))
+        name, file = arrays_file(self._files(category_id))
         return Reference.from_arrays(read_arrays(self.folder(category_id) / name, file.sha256))
 
     def summary(self, category_id: str) -> Summary:
@@ -155,17 +154,21 @@ class Categories:
         return found
 
     def burst(self, category_id: str) -> Burst:
-        """All reference views. Raises NotFound."""
-        return read_burst(self.folder(self.get(category_id).id))
+        """All reference views. Raises NotFound, and Unavailable where one is damaged."""
+        return read_burst(self.folder(category_id), self._files(category_id))
 
     def view(self, category_id: str, index: int) -> View:
-        """One reference view. Raises NotFound."""
+        """One reference view. Raises NotFound, and Unavailable where it is damaged."""
         self._require_view(category_id, index)
-        return read_view(self.folder(category_id), index)
+        return read_view(self.folder(category_id), self._files(category_id), index)
 
     def folder(self, category_id: str) -> Path:
         """Where its files are."""
         return self.root / category_id
+
+    def _files(self, category_id: str) -> Files:
+        rows = self._connection.rows("SELECT files FROM categories WHERE id = ?", self.get(category_id).id)
+        return files_from_json(rows[0]["files"])
 
     def _require_view(self, category_id: str, index: int) -> None:
         category = self.get(category_id)

@@ -7,7 +7,7 @@ import sqlite3
 import threading
 import uuid
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from contextvars import ContextVar
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ from typing import Any
 from sqlite_utils import Database
 
 from core.errors import Conflict, Unavailable
-from store.folders import FileSum, new_folder, sums
+from store.folders import FileSum, new_folder, sums, sync
 from store.retention import Retention
 from store.schema import upgrade
 
@@ -25,6 +25,13 @@ DATABASE = "memory.sqlite3"
 TAKE_TURN = "UPDATE meta SET value = value WHERE key = 'memory_version'"
 """Changes nothing, and comes first: SQLite waits for another process (`onelook keys`) to end its change only before a transaction has
 read anything."""
+
+before_change: ContextVar[Callable[[], None] | None] = ContextVar("before_change", default=None)
+"""Called before anything of a change is written; raises where whoever asked for the change does not want it any more."""
+
+TRIAL = ".trial"
+"""Name of a file that is written to see whether the disk takes one again; of the size of a small burst."""
+TRIAL_BYTES = 1_000_000
 
 running_request: ContextVar[tuple[str, str] | None] = ContextVar("running_request", default=None)
 """Key and route of the repeatable request that the present changes are made for; see store/requests.py."""
@@ -41,6 +48,8 @@ class Connection:
         self.root = root
         self.retention = retention or Retention()
         self._lock = threading.RLock()
+        self._trouble: str | None = None
+        """What the last attempt to write failed of; None where it did not."""
         try:
             self._db = Database(sqlite3.connect(root / DATABASE, check_same_thread=False))
         except sqlite3.Error as error:
@@ -73,12 +82,30 @@ class Connection:
                 f"the memory in {self.root} does not answer: {error}; check its disk, then start the service again"
             ) from error
 
+    def require_sound(self) -> None:
+        """Raises Unavailable where the database cannot be read, or where writing failed the last time and still does."""
+        self.rows("SELECT value FROM meta WHERE key = 'memory_version'")
+        if self._trouble is None:
+            return
+        trial = self.root / TRIAL
+        try:
+            trial.write_bytes(bytes(TRIAL_BYTES))
+            sync(trial)
+        except OSError as error:
+            raise self._unwritable(error) from error
+        finally:
+            with suppress(OSError):
+                trial.unlink(missing_ok=True)
+        with self.housekeeping():
+            pass
+
     @contextmanager
     def change(self, made: str | None = None) -> Iterator[Database]:
         """One transaction, which also makes memory_version grow, and notes what a repeatable request `made`.
 
         Raises Conflict where it refers to rows that are gone, Unavailable where it cannot be written.
         """
+        self._require_wanted()
         with self.housekeeping() as db:
             yield db
             db.execute("UPDATE meta SET value = value + 1 WHERE key = 'memory_version'")
@@ -93,6 +120,7 @@ class Connection:
             with self._lock, self._db.atomic():
                 self._db.execute(TAKE_TURN)
                 yield self._db
+            self._trouble = None
         except sqlite3.IntegrityError as error:
             raise Conflict("a category, scan or observation that this needs was deleted meanwhile; send the request again") from error
         except sqlite3.ProgrammingError:
@@ -122,6 +150,7 @@ class Connection:
 
         Stopped before the rows are committed, a process leaves folders without rows, which the next start removes.
         """
+        self._require_wanted()
         files: dict[Path, dict[str, FileSum]] = {}
         with ExitStack() as undo:
             for folder, write in folders.items():
@@ -141,7 +170,13 @@ class Connection:
         for folder in folders:
             shutil.rmtree(folder, ignore_errors=True)
 
+    def _require_wanted(self) -> None:
+        ask = before_change.get()
+        if ask is not None:
+            ask()
+
     def _unwritable(self, error: Exception) -> Unavailable:
+        self._trouble = str(error)
         return Unavailable(f"cannot write to the memory in {self.root}: {error}; free space or set another ONELOOK_DATA_DIR")
 
 

@@ -10,6 +10,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from core.errors import Unavailable
+
 PARTIAL = ".partial-"
 """Prefix of a folder or file that is still being written."""
 
@@ -69,6 +71,20 @@ def sync(path: Path) -> None:
 def sums(folder: Path) -> dict[str, FileSum]:
     """What the files of a folder are now, by name."""
     return {path.name: FileSum.of(path.read_bytes()) for path in sorted(folder.iterdir())}
+
+
+def read_whole(path: Path, sha256: str) -> bytes:
+    """What was written to a file. Raises Unavailable where it is missing, cannot be read, or is not what was written."""
+    try:
+        content = path.read_bytes()
+    except FileNotFoundError:
+        raise Unavailable(f"{path} is missing from the memory; restore it from a backup") from None
+    except OSError as error:
+        raise Unavailable(f"{path} cannot be read: {error.strerror}; check the disk, or restore it from a backup") from error
+    found = FileSum.of(content).sha256
+    if found != sha256:
+        raise Unavailable(f"{path} is damaged: its SHA-256 is {found[:12]}…, {sha256[:12]}… was written; restore it from a backup")
+    return content
 
 
 def problem(path: Path, expected: FileSum) -> str | None:

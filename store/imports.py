@@ -193,7 +193,7 @@ def _judge_category(folder: Path, part: CategoryEntry, category_id: str, fingerp
         files = {name: entry.sum for name, entry in part.files.items()}
         name, _ = arrays_file(files)
         arrays = untrusted.arrays((folder / name).read_bytes(), name)
-        burst, reference = read_burst(folder), Reference.from_arrays(arrays)
+        burst, reference = read_burst(folder, files), Reference.from_arrays(arrays)
         for goal in part.goals:
             sim3_from_json(goal.target_from_reference)
         _require(len(reference.views) == len(burst), "its reference has as many views as pictures")

@@ -20,6 +20,7 @@ from core.views import Burst
 from store.arrays import Array, from_blob, patches_from_blob, patches_to_blob, to_blob
 from store.audit import record
 from store.bursts import read_burst
+from store.columns import files_from_json
 from store.connection import Connection, Row, new_id, only
 from store.records import Assignment, Instance
 from store.retention import now
@@ -58,7 +59,9 @@ class Instances:
         instance = self.get(instance_id)
         if instance.pictures is None:
             raise Unavailable(f"the views of instance {instance_id!r} are no longer kept: its observation was dropped as one of the oldest")
-        return read_burst(self._connection.root / instance.pictures)
+        table, _, row_id = instance.pictures.partition("/")
+        (row,) = self._connection.rows(f"SELECT files FROM {table} WHERE id = ?", row_id)
+        return read_burst(self._connection.root / instance.pictures, files_from_json(row["files"]))
 
     def forget(self, category_id: str, instance_id: str, *, actor: str | None = None) -> None:
         """Takes one out of a category. Raises NotFound, and Conflict for a category's last."""

@@ -28,6 +28,7 @@ from store.categories import Categories
 from store.check import CheckReport, Progress, Sizes, check, sizes
 from store.connection import DATABASE, Connection
 from store.corrections import Corrections
+from store.folders import make_parents
 from store.goals import Goals
 from store.imports import Import, import_archive
 from store.instances import Instances
@@ -221,8 +222,8 @@ class Memory:
         return result
 
     def ping(self) -> None:
-        """Raises Unavailable where the database does not answer."""
-        self._connection.rows("SELECT 1")
+        """Raises Unavailable where the memory cannot be read, or could not be written the last time and still cannot."""
+        self._connection.require_sound()
 
     def close(self) -> None:
         """Closes the file and lets other processes in."""
@@ -244,7 +245,7 @@ class Memory:
 def _lock(folder: Path) -> TextIOWrapper:
     """Keeps other processes out until it is closed, also by the end of this one."""
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        make_parents(folder / "lock")
         lock = (folder / "lock").open("w")
     except OSError as error:
         raise Unavailable(f"cannot open the memory in {folder}: {error}; set ONELOOK_DATA_DIR to a folder that can be written") from error

@@ -151,20 +151,19 @@ class Observations:
         return _observation(row)
 
     def view(self, observation_id: str, index: int) -> View:
-        """One of its views. Raises NotFound."""
+        """One of its views. Raises NotFound, and Unavailable where it is damaged."""
         observation = self.get(observation_id)
         if not 0 <= index < observation.views:
             raise NotFound(f"observation {observation_id!r} has the views 0 to {observation.views - 1}, not {index}")
-        return read_view(self.folder(observation_id), index)
+        return read_view(self.folder(observation_id), self._files(observation_id), index)
 
     def burst(self, observation_id: str) -> Burst:
-        """All its views. Raises NotFound."""
-        return read_burst(self.folder(self.get(observation_id).id))
+        """All its views. Raises NotFound, and Unavailable where one is damaged."""
+        return read_burst(self.folder(observation_id), self._files(observation_id))
 
     def features(self, observation_id: str) -> dict[str, Array]:
         """The arrays it was kept with. Raises NotFound, and Unavailable where their file is damaged."""
-        rows = self._connection.rows("SELECT files FROM observations WHERE id = ?", self.get(observation_id).id)
-        name, file = arrays_file(files_from_json(rows[0]["files"]))
+        name, file = arrays_file(self._files(observation_id))
         return read_arrays(self.folder(observation_id) / name, file.sha256)
 
     def folder(self, observation_id: str) -> Path:
@@ -176,6 +175,10 @@ class Observations:
         with self._connection.housekeeping() as db:
             dropped = self._drop_oldest(db)
         self._connection.remove([self.folder(each) for each in dropped])
+
+    def _files(self, observation_id: str) -> Files:
+        rows = self._connection.rows("SELECT files FROM observations WHERE id = ?", self.get(observation_id).id)
+        return files_from_json(rows[0]["files"])
 
     def _drop_oldest(self, db: Database) -> list[str]:
         """Within a transaction; returns which, whose folders go once it is committed."""

@@ -89,7 +89,7 @@ def _compute(connection: Connection, encoder: Encoder, features: Features, gener
         folder = connection.root / row["folder"]
         files = files_from_json(row["files"])
         try:
-            encoded = agreeing(encoder.encode(read_burst(folder)))
+            encoded = agreeing(encoder.encode(read_burst(folder, files)))
             if table == "categories":
                 reference = build_reference(encoded)
                 written = _beside(folder, files, f"reference-{generation}.npz", reference.as_arrays())

@@ -10,9 +10,9 @@ from sqlite_utils import Database
 
 from core.errors import Conflict, NotFound
 from core.scan import ScanRequest
-from core.views import Burst, Camera
-from store.bursts import read_burst, read_cameras, write_burst
-from store.columns import files_to_json, request_from_json, request_to_json
+from core.views import Burst
+from store.bursts import read_burst, write_burst
+from store.columns import files_from_json, files_to_json, request_from_json, request_to_json
 from store.connection import Connection, Row, new_id, only
 from store.folders import Files
 from store.records import Scan
@@ -97,20 +97,9 @@ class Scans:
         return [json.loads(row["report"] or "null") for row in rows]
 
     def burst(self, scan_id: str) -> Burst | None:
-        """All views received so far as one burst, None before the first. Raises NotFound."""
-        self.get(scan_id)
-        folders = [self.root / scan_id / burst_id for burst_id in self.burst_ids(scan_id)]
-        views = [view for folder in folders for view in read_burst(folder).views]
+        """All views received so far as one burst, None before the first. Raises NotFound, and Unavailable where one is damaged."""
+        views = [view for folder, files in self._folders(scan_id) for view in read_burst(folder, files).views]
         return Burst(views) if views else None
-
-    def cameras(self, scan_id: str) -> list[Camera | None]:
-        """Of all views received so far, in the order of `burst`, without reading the images. Raises NotFound."""
-        self.get(scan_id)
-        return [camera for burst_id in self.burst_ids(scan_id) for camera in read_cameras(self.root / scan_id / burst_id)]
-
-    def burst_ids(self, scan_id: str) -> list[str]:
-        """The bursts received, oldest first."""
-        return [row["id"] for row in self._connection.rows("SELECT id FROM scan_bursts WHERE scan_id = ? ORDER BY rowid", scan_id)]
 
     def delete(self, scan_id: str) -> None:
         """Forgets it and its views; the category of a completed one stays. Raises NotFound."""
@@ -131,6 +120,12 @@ class Scans:
     def folder(self, scan_id: str) -> Path:
         """Where its views are."""
         return self.root / scan_id
+
+    def _folders(self, scan_id: str) -> list[tuple[Path, Files]]:
+        """Of the bursts received, oldest first. Raises NotFound."""
+        self.get(scan_id)
+        rows = self._connection.rows("SELECT id, files FROM scan_bursts WHERE scan_id = ? ORDER BY rowid", scan_id)
+        return [(self.root / scan_id / row["id"], files_from_json(row["files"])) for row in rows]
 
     def _expiry(self) -> str:
         return ahead(self._connection.retention.scans)
