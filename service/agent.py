@@ -7,7 +7,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from core.agreement import agreeing
-from core.backbones.base import Backbone
 from core.boxes import OrientedBox
 from core.clock import StageClock
 from core.encode import EncodedBurst, Encoder
@@ -20,12 +19,14 @@ from core.pose import PoseConfig, PoseEstimator, PoseOptions
 from core.reference import Reference
 from core.scan import DEFAULT_VIEWPOINTS, ScanOptions, ScanRequest, request_scan
 from core.views import Burst, View
+from service.batching import BatchingBackbone
 from service.curation import Curation
 from service.events import Events
 from service.features import best_pair, features_as_arrays
 from service.goals import Rearranging
 from service.judgement import VERIFYING, Judge, Judgement
 from service.scanning import Scanning
+from service.turn import require_wanted
 from service.upkeep import Upkeep
 from store.memory import Memory
 from store.observations import Answer, Joins
@@ -79,7 +80,7 @@ _PoseOrReason = tuple[PoseEstimate | None, Pose | None, str | None]
 class Agent:
     """One memory and the backbone that fills it. Safe to use from several threads."""
 
-    def __init__(self, backbone: Backbone, memory: Memory, config: AgentConfig, events: Events | None = None) -> None:
+    def __init__(self, backbone: BatchingBackbone, memory: Memory, config: AgentConfig, events: Events | None = None) -> None:
         """Raises Conflict where the memory was made with another backbone, InvalidInput for an unknown score or variant."""
         config.validate()
         memory.require_backbone(backbone.name, backbone.fingerprint)
@@ -163,6 +164,7 @@ class Agent:
         if category_id in judge.poses and estimator.config == VERIFYING:
             reference, estimate = judge.poses[category_id]
             return estimate, _pose_record(estimate, reference, burst), None
+        require_wanted()
         try:
             reference = self.memory.categories.reference(category_id)
             clock.lap("load")

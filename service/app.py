@@ -16,6 +16,7 @@ from fastapi import FastAPI
 from core.backbones.base import Backbone
 from core.backbones.dino import load_backbone
 from core.encode import EncoderConfig
+from core.errors import OneLookError
 from service import errors, openapi
 from service.agent import Agent, AgentConfig
 from service.auth import Guard
@@ -24,7 +25,7 @@ from service.browsers import OwnPagesOnly
 from service.console.demo import Demo
 from service.console.install import install as install_console
 from service.events import Event, Events
-from service.limits import UploadLimit
+from service.limits import BodyLimits
 from service.logs import Logged, log_event
 from service.metrics import Measured, Metrics
 from service.routes import categories, goals, health, memory, observations, scans, track
@@ -53,7 +54,7 @@ def create_app(settings: Settings, *, backbone: Backbone | None = None, asks: bo
         with open_agent(settings, backbone, metrics) as agent:
             app.state.agent = agent
             app.state.guard = Guard(agent.memory.keys, agent.memory.sessions, settings.rate_limit, asks=asks)
-            app.state.work = work = metrics.watched_queue(settings.workers, settings.queue)
+            app.state.work = work = metrics.watched_queue(settings.workers, settings.queue, settings.deadline_s)
             metrics.tell_build(agent.backbone.name)
             async with anyio.create_task_group() as tasks:
                 tasks.start_soon(_keep_pruned, agent.memory)
@@ -76,7 +77,7 @@ def create_app(settings: Settings, *, backbone: Backbone | None = None, asks: bo
     app.state.metrics = metrics
     app.state.tracks = 0
     app.state.demo = Demo()
-    app.add_middleware(UploadLimit, max_mb=settings.max_upload_mb)
+    app.add_middleware(BodyLimits, max_mb=settings.max_upload_mb, bodies=settings.workers + settings.queue, deadline_s=settings.deadline_s)
     app.add_middleware(OwnPagesOnly)
     app.add_middleware(Measured, metrics=metrics)
     app.add_middleware(Logged)
@@ -94,7 +95,10 @@ async def _keep_pruned(memory: Memory) -> None:
     """Ends what has an end: scans that no views come for, what can no longer be undone, keys of old requests."""
     while True:
         await anyio.sleep(PRUNE_EVERY_S)
-        await run_sync(memory.prune)
+        try:
+            await run_sync(memory.prune)
+        except OneLookError as error:  # a full disk; /readyz says so, and the next round may do it
+            log.warning("cannot drop what is over: %s", error)
 
 
 @contextmanager

@@ -7,13 +7,21 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
 
 from core.backbones.base import Backbone, Features
+from core.encode import EncoderConfig
+from core.errors import OneLookError, Unavailable
+from service.turn import CalledOff, require_wanted
 
 Images = NDArray[np.uint8]
 LARGEST_PASS = 64
 """Images of one pass: more would only make the first of them wait."""
+LOOK_S = 0.1
+"""How often who waits for a pass looks whether it is still wanted."""
+CPU_ALLOCATOR = "can't allocate memory"
+"""What torch's error says there, which is of no class of its own."""
 
 
 @dataclass(eq=False)
@@ -33,7 +41,8 @@ class _Ticket:
 class BatchingBackbone:
     """A backbone for many threads: what waits while a pass runs goes into the next one together, so nobody waits for company.
 
-    Within a pass, tokens may differ from those of a pass alone in their last bits.
+    Within a pass, tokens may differ from those of a pass alone in their last bits. A pass that fails is repeated for each request alone, so
+    that one cannot fail the others, and one that memory does not suffice for in halves.
     """
 
     def __init__(self, backbone: Backbone, on_pass: Callable[[int], None] = lambda images: None) -> None:
@@ -49,19 +58,45 @@ class BatchingBackbone:
         self._waiting: list[_Ticket] = []
         self._waiting_lock = threading.Lock()
         self._pass_lock = threading.Lock()
+        self._trouble: str | None = None
+        """What the last pass failed of; None where it did not."""
 
     def extract(self, images: Images) -> Features:
-        """See `Backbone.extract`."""
+        """See `Backbone.extract`. Raises Unavailable where it fails, and CalledOff where nobody waits for it any more."""
         ticket = _Ticket(images)
         with self._waiting_lock:
             self._waiting.append(ticket)
-        with self._pass_lock:
+        self._take_pass(ticket)
+        try:
             if not ticket.done:  # else an earlier pass took it along
                 self._run(self._company(ticket))
+        finally:
+            self._pass_lock.release()
         if ticket.error is not None:
-            raise ticket.error
+            raise self._unavailable(ticket.error) from ticket.error
         assert ticket.features is not None
         return ticket.features
+
+    def require_sound(self) -> None:
+        """Raises Unavailable where the last pass failed and another one, of one image, still does; one that runs is not waited for."""
+        if self._trouble is None or not self._pass_lock.acquire(blocking=False):
+            return
+        side = EncoderConfig().first_grid * self.patch_size
+        try:
+            self._passed(np.zeros((1, side, side, 3), np.uint8))
+        except Exception as error:
+            raise self._unavailable(error) from error
+        finally:
+            self._pass_lock.release()
+
+    def _take_pass(self, ticket: _Ticket) -> None:
+        while not self._pass_lock.acquire(timeout=LOOK_S):
+            try:
+                require_wanted()
+            except CalledOff:
+                with self._waiting_lock:
+                    self._waiting = [each for each in self._waiting if each is not ticket]
+                raise
 
     def _company(self, ticket: _Ticket) -> list[_Ticket]:
         """What waits and has images of the same size, the ticket itself first, up to LARGEST_PASS images."""
@@ -77,16 +112,50 @@ class BatchingBackbone:
 
     def _run(self, tickets: list[_Ticket]) -> None:
         try:
-            features = self._backbone.extract(np.concatenate([ticket.images for ticket in tickets]))
+            features = self._passed(np.concatenate([ticket.images for ticket in tickets]))
         except Exception as error:
-            for ticket in tickets:
-                ticket.error = error
+            if len(tickets) == 1:
+                tickets[0].error = error
+            else:
+                for ticket in tickets:
+                    self._run([ticket])
             return
-        self._on_pass(sum(len(ticket.images) for ticket in tickets))
         start = 0
         for ticket in tickets:
             ticket.features = _slice(features, slice(start, start + len(ticket.images)))
             start += len(ticket.images)
+
+    def _passed(self, images: Images) -> Features:
+        try:
+            features = self._backbone.extract(images)
+        except Exception as error:
+            self._trouble = f"{type(error).__name__}: {error}"
+            if not _out_of_memory(error) or len(images) == 1:
+                raise
+            half = len(images) // 2
+            return _joined(self._passed(images[:half]), self._passed(images[half:]))
+        self._trouble = None
+        self._on_pass(len(images))
+        return features
+
+    def _unavailable(self, error: Exception) -> OneLookError:
+        if isinstance(error, OneLookError):
+            return error
+        found = f"{type(error).__name__}: {str(error).strip().partition(chr(10))[0]}"
+        remedy = "send fewer views, or give the service more memory" if _out_of_memory(error) else "its log says more; start it again"
+        return Unavailable(f"the backbone {self.name} failed ({found}); {remedy}")
+
+
+def _out_of_memory(error: Exception) -> bool:
+    return isinstance(error, (MemoryError, torch.OutOfMemoryError)) or CPU_ALLOCATOR in str(error)
+
+
+def _joined(first: Features, second: Features) -> Features:
+    saliency = None if first.saliency is None or second.saliency is None else np.concatenate([first.saliency, second.saliency])
+    patches, cls, attention = (
+        np.concatenate([getattr(each, name) for each in (first, second)]) for name in ("patches", "cls", "attention")
+    )
+    return Features(patches, cls, attention, saliency)
 
 
 def _slice(features: Features, part: slice) -> Features:

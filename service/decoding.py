@@ -20,10 +20,29 @@ from service.errors import field_path
 from service.images import decode_colour, decode_depth, decode_mask
 from service.schemas.bursts import BurstPart, matrix
 
-MAX_BURST_PIXELS = 128_000_000
-"""Colour pixels of a burst, all views together: with depth and masks about 1 GB once decoded."""
-
 FloatArray = NDArray[np.floating]
+
+
+@dataclass(frozen=True)
+class BurstLimits:
+    """What one burst may have."""
+
+    views: int
+    megapixels: int
+    """Of its colour images together."""
+
+    def require_views(self, field: str, views: int) -> None:
+        """Raises InvalidInput naming `field`."""
+        if not 1 <= views <= self.views:
+            raise InvalidInput(field, f"has {views} images; a burst has 1 to {self.views} views (ONELOOK_MAX_VIEWS)")
+
+    def require_pixels(self, field: str, pixels: int) -> None:
+        """Raises InvalidInput naming `field`."""
+        if pixels > self.megapixels * 1_000_000:
+            raise InvalidInput(
+                field,
+                f"its images have more than {self.megapixels} megapixels together (ONELOOK_MAX_MEGAPIXELS); send smaller or fewer ones",
+            )
 
 
 @dataclass(frozen=True)
@@ -44,25 +63,19 @@ class Upload:
     frame: str | None
 
 
-def decode_parts(parts: Parts, max_views: int) -> Upload:
+def decode_parts(parts: Parts, limits: BurstLimits) -> Upload:
     """From multipart/form-data. Raises InvalidInput naming the part that is wrong."""
     about = _about(parts.burst)
     views = len(parts.rgb)
-    require_view_count("rgb", views, max_views)
+    limits.require_views("rgb", views)
     for name, found in (("depth", len(parts.depth)), ("mask", len(parts.mask)), ("burst.views", len(about.views or ()))):
         if found not in (0, views):
             raise InvalidInput(name, f"has {found} entries for {views} rgb images; send one a view, in the same order, or none")
-    rgb = _images(parts.rgb, "rgb", decode_colour)
-    depth_m = [(image * about.depth_scale).astype(np.float32) for image in _images(parts.depth, "depth", decode_depth)]
-    mask = _images(parts.mask, "mask", decode_mask)
+    rgb = _images(parts.rgb, "rgb", decode_colour, limits)
+    depth_m = [(image * about.depth_scale).astype(np.float32) for image in _images(parts.depth, "depth", decode_depth, limits)]
+    mask = _images(parts.mask, "mask", decode_mask, limits)
     cameras = [(matrix(view.K, 3), matrix(view.world_from_camera, 4)) for view in about.views or ()]
     return Upload(assemble(rgb, depth_m, mask, cameras), about.frame)
-
-
-def require_view_count(field: str, views: int, max_views: int) -> None:
-    """Raises InvalidInput naming `field`."""
-    if not 1 <= views <= max_views:
-        raise InvalidInput(field, f"has {views} images; a burst has 1 to {max_views} views (ONELOOK_MAX_VIEWS)")
 
 
 def assemble(
@@ -119,13 +132,10 @@ def _about(part: str | bytes) -> BurstPart:
         raise InvalidInput(field, first["msg"].removeprefix("Value error, ")) from None
 
 
-def _images(contents: Sequence[bytes], name: str, decode: Callable[[bytes, str], NDArray[Any]]) -> list[NDArray[Any]]:
+def _images(contents: Sequence[bytes], name: str, decode: Callable[[bytes, str], NDArray[Any]], limits: BurstLimits) -> list[NDArray[Any]]:
     images, pixels = [], 0
     for index, content in enumerate(contents):
         images.append(decode(content, f"{name}[{index}]"))
         pixels += images[-1].shape[0] * images[-1].shape[1]
-        if pixels > MAX_BURST_PIXELS:
-            raise InvalidInput(
-                name, f"its images have more than {MAX_BURST_PIXELS // 1_000_000} megapixels together; send smaller or fewer ones"
-            )
+        limits.require_pixels(name, pixels)
     return images

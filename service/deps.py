@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Coroutine
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
-from anyio.to_thread import run_sync
 from fastapi import Depends, Header, Request
 from fastapi.exceptions import RequestValidationError
 from pydantic import BaseModel, ValidationError
@@ -18,13 +17,16 @@ from core.errors import InvalidInput
 from core.views import Burst
 from service.agent import Agent
 from service.auth import LONGEST_ACTOR, Caller
-from service.decoding import Parts, Upload, decode_parts
+from service.decoding import BurstLimits, Parts, Upload, decode_parts
 from service.npz import decode_npz
 from service.settings import Settings
 from service.work import WorkQueue
 
 IMAGE_PARTS = ("rgb", "depth", "mask")
 PARTS = ("burst", *IMAGE_PARTS)
+T = TypeVar("T")
+Decode = Callable[[], Upload]
+"""Decodes a body that has arrived: images are many times larger than their files, so only what is worked on is decoded."""
 
 
 def _agent(request: Request) -> Agent:
@@ -32,9 +34,29 @@ def _agent(request: Request) -> Agent:
     return agent
 
 
-def _work(request: Request) -> WorkQueue:
-    work: WorkQueue = request.app.state.work
-    return work
+@dataclass(frozen=True)
+class RequestWork:
+    """The work that one request asks for."""
+
+    queue: WorkQueue
+    request: Request
+
+    async def run(self, work: Callable[[], T]) -> T:
+        """See `WorkQueue.run`: until the deadline, and while whoever asks is there."""
+        return await self.queue.run(work, gone=self._gone)
+
+    async def run_endless(self, work: Callable[[], T]) -> T:
+        """As long as it takes, also for nobody."""
+        return await self.queue.run(work, endless=True)
+
+    async def _gone(self) -> None:
+        """Returns once the connection has ended; the body was read before."""
+        while (await self.request.receive())["type"] != "http.disconnect":
+            pass
+
+
+def _work(request: Request) -> RequestWork:
+    return RequestWork(request.app.state.work, request)
 
 
 def _actor(
@@ -58,16 +80,17 @@ def media_type(request: Request) -> str:
     return request.headers.get("content-type", "").partition(";")[0].strip().lower()
 
 
-async def read_upload(request: Request) -> Upload:
-    """The burst in the body, in either form. Raises InvalidInput, HTTPException 415."""
+async def read_upload(request: Request) -> Decode:
+    """The burst in the body, in either form, to be decoded where work is done. Raises InvalidInput, HTTPException 415."""
     settings: Settings = request.app.state.settings
+    limits = BurstLimits(settings.max_views, settings.max_megapixels)
     kind = media_type(request)
     if kind == "application/x-npz":
         body = await request.body()
-        return await run_sync(lambda: decode_npz(body, settings.max_views))
+        return lambda: decode_npz(body, limits)
     if kind == "multipart/form-data":
         parts = await _read_parts(request, settings)
-        return await run_sync(lambda: decode_parts(parts, settings.max_views))
+        return lambda: decode_parts(parts, limits)
     found = f"is {kind}" if kind else "has no Content-Type"
     raise HTTPException(415, f"the body {found}; send multipart/form-data with the parts burst and rgb, or application/x-npz")
 
@@ -82,20 +105,24 @@ class Source:
     """Of the burst."""
 
 
-def read_source(model: type[BaseModel]) -> Callable[[Request], Coroutine[Any, Any, Source]]:
-    """A dependency: a burst in either form, or JSON of `model`, which names an observation."""
+def read_source(model: type[BaseModel]) -> Callable[[Request], Coroutine[Any, Any, Callable[[], Source]]]:
+    """A dependency: a burst in either form, to be decoded where work is done, or JSON of `model`, which names an observation."""
 
-    async def source(request: Request) -> Source:
+    async def source(request: Request) -> Callable[[], Source]:
         if media_type(request) != "application/json":
-            upload = await read_upload(request)
-            return Source(upload.burst, upload.frame)
+            decode = await read_upload(request)
+            return lambda: _source(decode())
         try:
             named: Any = model.model_validate_json(await request.body())
         except ValidationError as error:
             raise RequestValidationError(error.errors()) from None
-        return Source(named.observation_id, None)
+        return lambda: Source(named.observation_id, None)
 
     return source
+
+
+def _source(upload: Upload) -> Source:
+    return Source(upload.burst, upload.frame)
 
 
 async def _read_parts(request: Request, settings: Settings) -> Parts:
@@ -134,6 +161,6 @@ async def _burst_part(form: FormData) -> str | bytes:
 
 
 AgentDep = Annotated[Agent, Depends(_agent)]
-WorkDep = Annotated[WorkQueue, Depends(_work)]
+WorkDep = Annotated[RequestWork, Depends(_work)]
 ActorDep = Annotated[str | None, Depends(_actor)]
-UploadDep = Annotated[Upload, Depends(read_upload)]
+UploadDep = Annotated[Decode, Depends(read_upload)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import logging
 from collections.abc import Sequence
 from http import HTTPStatus
@@ -34,6 +35,9 @@ KINDS: tuple[tuple[type[core.OneLookError], int, str, str], ...] = (
 )
 """The first kind that an error is an instance of says its status, type and title."""
 
+MACHINE = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EROFS, errno.ENOMEM, errno.EMFILE, errno.ENFILE})
+"""What the operating system refuses though the request is in order."""
+
 STILL_RUNNING_S = 1
 """After which a request is worth repeating whose first one is still being answered."""
 
@@ -43,6 +47,8 @@ def install(app: FastAPI) -> None:
     app.add_exception_handler(core.OneLookError, _on_onelook_error)
     app.add_exception_handler(RequestValidationError, _on_validation_error)
     app.add_exception_handler(HTTPException, _on_http_exception)
+    app.add_exception_handler(MemoryError, _on_out_of_memory)
+    app.add_exception_handler(OSError, _on_os_error)
     app.add_exception_handler(Exception, _on_unexpected)
 
 
@@ -118,6 +124,24 @@ def _on_http_exception(request: Request, error: Exception) -> JSONResponse:
     elif error.status_code == 405 and detail == title:
         detail = f"{request.url.path} does not answer {request.method}; /docs lists what it answers"
     return _answer(Problem(type="about:blank", title=title, status=error.status_code, detail=detail), error.headers)
+
+
+def _on_out_of_memory(request: Request, error: Exception) -> JSONResponse:
+    return _on_onelook_error(
+        request,
+        core.Unavailable("the service is out of memory; send fewer or smaller views, or lower ONELOOK_WORKERS, _QUEUE or _MAX_MEGAPIXELS"),
+    )
+
+
+def _on_os_error(request: Request, error: Exception) -> JSONResponse:
+    """Of temporary files, mostly: what concerns the memory is told by the store."""
+    assert isinstance(error, OSError)
+    if error.errno not in MACHINE:
+        raise error
+    where = f" ({error.filename})" if error.filename else ""
+    return _on_onelook_error(
+        request, core.Unavailable(f"this machine cannot: {error.strerror}{where}; free it, then send the request again")
+    )
 
 
 def _on_unexpected(request: Request, error: Exception) -> JSONResponse:

@@ -16,6 +16,7 @@ from core.novelty import BEST, Context, Decision, DecisionConfig, decide
 from core.pose import PoseConfig, PoseEstimator
 from core.reference import Reference
 from core.verification import agreement
+from service.turn import require_wanted
 from store.memory import Memory
 
 CALIBRATED_BY = 300
@@ -57,6 +58,7 @@ class Judge:
         return bool(len(self.encoded.cloud_m)) and all(view.camera is not None for view in self.encoded.views)
 
     def _agreement(self, category_id: str) -> float:
+        require_wanted()
         try:
             reference = self.memory.categories.reference(category_id)
             estimate = PoseEstimator(VERIFYING).estimate(reference, self.encoded, seed=self.seed)

@@ -55,9 +55,9 @@ class Metrics:
         self._bytes = Gauge("onelook_memory_bytes", "What the memory takes on disk, the bin included.", registry=self._registry)
         self._version = Gauge("onelook_memory_version", "Grows with each change of the memory.", registry=self._registry)
 
-    def watched_queue(self, workers: int, queue: int) -> WorkQueue:
+    def watched_queue(self, workers: int, queue: int, deadline_s: float) -> WorkQueue:
         """A queue whose length and refusals are shown."""
-        work = WorkQueue(workers, queue, self._waited.observe, lambda why: self._refused.labels(why).inc())
+        work = WorkQueue(workers, queue, deadline_s, self._waited.observe, lambda why: self._refused.labels(why).inc())
         shown: dict[str, tuple[str, Callable[[], float]]] = {
             "onelook_work_running": ("Requests that are worked on.", lambda: work.running),
             "onelook_work_waiting": ("Requests that wait.", lambda: work.waiting),

@@ -18,30 +18,32 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from core.errors import InvalidInput
-from service.decoding import MAX_BURST_PIXELS, Upload, assemble, require_view_count
+from service.decoding import BurstLimits, Upload, assemble
 
 DIMENSIONS = {"rgb": (4,), "depth_m": (3,), "K": (2, 3), "world_from_camera": (3,), "mask": (3,)}
 """The arrays that may be sent, and how many dimensions each may have."""
 HEADER_READERS = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
 MAX_HEADER_BYTES = 4096
+IMAGES = ("rgb", "depth_m", "mask")
+EXPECTED = {
+    "rgb": "(V, H, W, 3)",
+    "depth_m": "(V, H, W)",
+    "mask": "(V, H, W)",
+    "K": "(3, 3) or (V, 3, 3)",
+    "world_from_camera": "(V, 4, 4)",
+}
+LARGEST_MATRIX = 4
+"""Rows and columns of a camera's matrices."""
 
 
-def decode_npz(body: bytes, max_views: int) -> Upload:
+def decode_npz(body: bytes, limits: BurstLimits) -> Upload:
     """From application/x-npz. Raises InvalidInput naming the array that is wrong."""
-    arrays = _arrays(body)
-    rgb = arrays.get("rgb")
-    if rgb is None:
-        raise InvalidInput(
-            "rgb", f"is missing; the npz has {', '.join(sorted(arrays)) or 'nothing'}, expected rgb (V, H, W, 3) of uint8 at least"
-        )
+    arrays = _arrays(body, limits)
+    rgb = arrays["rgb"]
     views = len(rgb)
-    require_view_count("rgb", views, max_views)
     K, poses = arrays.get("K"), arrays.get("world_from_camera")
     if K is not None and K.ndim == 2:
         K = arrays["K"] = np.repeat(K[None], views, axis=0)
-    for name, array in arrays.items():
-        if len(array) != views:
-            raise InvalidInput(name, f"has {len(array)} entries for {views} rgb images; send one a view, in the same order")
     cameras = [(None if K is None else K[view], None if poses is None else poses[view]) for view in range(views)]
     with np.errstate(over="ignore"):  # becomes infinite, which the view refuses
         depth_m = [depth.astype(np.float32) for depth in arrays.get("depth_m", ())]
@@ -49,10 +51,15 @@ def decode_npz(body: bytes, max_views: int) -> Upload:
     return Upload(assemble(list(rgb), depth_m, masks, cameras), None)
 
 
-def _arrays(body: bytes) -> dict[str, NDArray[Any]]:
+def _arrays(body: bytes, limits: BurstLimits) -> dict[str, NDArray[Any]]:
     try:
         with zipfile.ZipFile(io.BytesIO(body)) as archive:
-            return {name: _array(archive, name) for name in map(_array_name, archive.namelist())}
+            entries = archive.namelist()
+            if len(entries) > len(DIMENSIONS):
+                raise InvalidInput("body", f"has {len(entries)} arrays; it may have {', '.join(DIMENSIONS)}, each once")
+            shapes = {name: _shape(archive, name) for name in map(_array_name, entries)}
+            _require_together(shapes, limits)
+            return {name: _array(archive, name) for name in shapes}
     except (zipfile.BadZipFile, zlib.error, struct.error, EOFError, NotImplementedError, RuntimeError, ValueError) as error:
         raise InvalidInput("body", f"is not a readable npz file ({error}); write it with numpy.savez") from None
 
@@ -64,7 +71,28 @@ def _array_name(entry: str) -> str:
     return name
 
 
-def _array(archive: zipfile.ZipFile, name: str) -> NDArray[Any]:
+def _require_together(shapes: dict[str, tuple[int, ...]], limits: BurstLimits) -> None:
+    """All of it is judged before anything of it is allocated: no array is much larger than the colour images are allowed to be."""
+    rgb = shapes.get("rgb")
+    if rgb is None:
+        raise InvalidInput(
+            "rgb", f"is missing; the npz has {', '.join(sorted(shapes)) or 'nothing'}, expected rgb (V, H, W, 3) of uint8 at least"
+        )
+    limits.require_views("rgb", rgb[0])
+    limits.require_pixels("rgb", math.prod(rgb[:3]))
+    if rgb[3] != 3:
+        raise InvalidInput("rgb", f"has shape {rgb}, expected (V, H, W, 3)")
+    for name, shape in shapes.items():
+        if name == "K" and len(shape) == 2:
+            shape = (rgb[0], *shape)
+        if shape[0] != rgb[0]:
+            raise InvalidInput(name, f"has {shape[0]} entries for {rgb[0]} rgb images; send one a view, in the same order")
+        side = max(rgb[1:3]) if name in IMAGES else LARGEST_MATRIX
+        if max(shape[1:]) > side:
+            raise InvalidInput(name, f"has shape {shape}, which fits no {rgb[2]}×{rgb[1]} images; send {EXPECTED[name]}")
+
+
+def _shape(archive: zipfile.ZipFile, name: str) -> tuple[int, ...]:
     with archive.open(f"{name}.npy") as stream:
         shape, dtype = _header(stream, name)
     if dtype.kind not in "buif":
@@ -72,10 +100,10 @@ def _array(archive: zipfile.ZipFile, name: str) -> NDArray[Any]:
     if len(shape) not in DIMENSIONS[name]:
         dimensions = " or ".join(map(str, DIMENSIONS[name]))
         raise InvalidInput(name, f"expected {dimensions} dimensions, found shape {shape}")
-    if math.prod(shape) * dtype.itemsize > 8 * MAX_BURST_PIXELS:
-        raise InvalidInput(
-            name, f"has shape {shape} of {dtype}: more than {MAX_BURST_PIXELS // 1_000_000} megapixels; send smaller or fewer views"
-        )
+    return shape
+
+
+def _array(archive: zipfile.ZipFile, name: str) -> NDArray[Any]:
     with archive.open(f"{name}.npy") as stream:
         try:
             array: NDArray[Any] = npy.read_array(stream, allow_pickle=False)

@@ -38,12 +38,16 @@ class Settings(BaseSettings):
     max_upload_mb: int = Field(128, gt=0, description="Largest request body, in megabytes of 1 000 000 bytes.")
     workers: int = Field(2, gt=0, description="Requests that are worked on at once; those that come together share passes of the backbone.")
     queue: int = Field(16, ge=0, description="Requests that may wait; more are answered 503 with Retry-After.")
+    deadline_s: float = Field(
+        90, gt=0, description="Seconds for a body to come, and then for its answer; after that it is answered 503, and nothing is changed."
+    )
     max_tracks: int = Field(4, ge=0, description="Objects that are followed at once over WS /v1/track.")
     rate_limit: int = Field(3000, gt=0, description="Requests a minute with one key; more are answered 429 with Retry-After.")
     log: Form = Field("text", description="Lines of the log: `text` for people, `json` for programs.")
     session_h: float = Field(12, gt=0, description="Hours after which somebody who signed in to the console is signed out.")
     backup_dir: Path | None = Field(None, description="Folder that backups are made in; beside the memory where left out.")
     max_views: int = Field(32, gt=0, description="Most views in one burst.")
+    max_megapixels: int = Field(128, gt=0, description="Most pixels of a burst, all views together; decoded, each takes 8 to 16 bytes.")
     scan_views: int = Field(10, ge=2, le=64, description="Viewpoints that a scan asks for.")
     scan_expiry_h: float = Field(24, gt=0, description="Hours after which a scan expires that no views come for.")
     keep_observations: int = Field(1000, gt=0, description="Observations kept, with their views; the oldest are dropped.")

@@ -1,16 +1,19 @@
-"""Where work that fills the machine runs: off the event loop, a few pieces at once, with a bounded queue before it."""
+"""Where work that fills the machine runs: off the event loop, a few pieces at once, with a bounded queue before it and a deadline."""
 
 from __future__ import annotations
 
+import asyncio
 import math
+import threading
 import time
-from collections.abc import Callable
-from typing import Literal, TypeVar
-
-import anyio
-from anyio.to_thread import run_sync
+from collections.abc import Callable, Coroutine
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextvars import Context, copy_context
+from typing import Any, Literal, TypeVar
 
 from core.errors import Unavailable
+from service.turn import Turn, present
+from store.connection import before_change
 
 T = TypeVar("T")
 FIRST_GUESS_S = 2.0
@@ -20,15 +23,25 @@ MEMORY = 0.8
 RESTART_S = 10
 """After which a request that a stopping service refused is worth sending again."""
 POLL_S = 0.02
-Refusal = Literal["full", "stopping"]
+Refusal = Literal["full", "stopping", "late", "gone"]
+Gone = Callable[[], Coroutine[Any, Any, None]]
+"""Returns once whoever asked has gone away."""
 
 
 class Busy(Unavailable):
-    """The queue is full, or the service stops."""
+    """The queue is full or too slow, or the service stops."""
 
     def __init__(self, message: str, retry_after_s: int) -> None:
         super().__init__(message)
         self.retry_after_s = retry_after_s
+
+
+class TooLate(Unavailable):
+    """A request took longer than it may."""
+
+
+class ClientGone(Unavailable):
+    """Nobody is there to be answered."""
 
 
 class WorkQueue:
@@ -38,47 +51,93 @@ class WorkQueue:
         self,
         workers: int,
         queue: int,
+        deadline_s: float = math.inf,
         on_start: Callable[[float], None] = lambda waited_s: None,
         on_refusal: Callable[[Refusal], None] = lambda why: None,
     ) -> None:
         """`workers` pieces run at once, `queue` more may wait; the callbacks are told what becomes of each."""
-        self._places = anyio.CapacityLimiter(workers)
-        self._threads = anyio.CapacityLimiter(workers)
+        self._threads = ThreadPoolExecutor(workers, "work")
         self._workers = workers
         self._queue = queue
+        self._deadline_s = deadline_s
         self._on_start = on_start
         self._on_refusal = on_refusal
         self._piece_s = FIRST_GUESS_S
         self._stopping = False
-        self.pending = 0
+        self._lock = threading.Lock()
+        self._given_up: dict[Turn, float] = {}
+        """Pieces that still run though nobody waits for them, and since when."""
+        self._pending = 0
+        self._running = 0
+
+    @property
+    def pending(self) -> int:
         """Pieces that run or wait."""
-        self.running = 0
+        return self._pending
+
+    @property
+    def running(self) -> int:
+        """Pieces that run."""
+        return self._running
 
     @property
     def waiting(self) -> int:
         """Pieces that wait."""
-        return self.pending - self.running
+        return self._pending - self._running
 
-    async def run(self, work: Callable[[], T]) -> T:
-        """The result of `work()`. Raises Busy."""
-        self._require_open()
-        if self.pending >= self._workers + self._queue:
-            self._on_refusal("full")
-            wait_s = max(1, math.ceil(self._piece_s * self.pending / self._workers))
-            raise Busy(f"{self.pending} requests are being worked on or wait (ONELOOK_QUEUE); send it again in {wait_s} s", wait_s)
-        self.pending += 1
-        arrived = time.perf_counter()
+    async def run(self, work: Callable[[], T], *, gone: Gone | None = None, endless: bool = False) -> T:
+        """The result of `work()`; what is `endless` is waited for however long it takes, also for nobody.
+
+        Raises Busy, TooLate after the queue's deadline, and ClientGone once `gone` returns. What was not begun by then is dropped; what
+        runs learns of it where it asks (service/turn.py), and keeps its worker until then. What already writes is finished and answered,
+        however late.
+        """
+        self._require_place()
+        turn = Turn()
+        with self._lock:
+            self._pending += 1
+        future: Future[T] = self._threads.submit(self._piece, turn, work, copy_context(), time.perf_counter())
+        future.add_done_callback(lambda _: self._leave())
+        answer = asyncio.wrap_future(future)
+        answer.add_done_callback(lambda done: done.cancelled() or done.exception())  # looked at, since nobody else may
         try:
-            async with self._places:
-                self._require_open()
-                self._on_start(time.perf_counter() - arrived)
-                self.running += 1
-                try:
-                    return await run_sync(self._timed, work, limiter=self._threads)
-                finally:
-                    self.running -= 1
+            why = None if endless else await self._awaited(answer, gone)
+        except asyncio.CancelledError:
+            self._give_up(turn, future)
+            raise
+        if why is not None and self._give_up(turn, future):
+            self._on_refusal("gone" if isinstance(why, ClientGone) else "late")
+            never_begun = future.cancelled() and isinstance(why, TooLate)
+            raise self._busy(f"no worker was free for {self._deadline_s:g} s") if never_begun else why
+        return await answer
+
+    async def _awaited(self, answer: asyncio.Future[T], gone: Gone | None) -> Unavailable | None:
+        """None once there is an answer; else why it is not waited for any longer."""
+        leaving = asyncio.ensure_future(gone()) if gone is not None else None
+        awaited: set[asyncio.Future[Any]] = {answer} if leaving is None else {answer, leaving}
+        deadline_s = None if math.isinf(self._deadline_s) else self._deadline_s
+        try:
+            done, _ = await asyncio.wait(awaited, timeout=deadline_s, return_when=asyncio.FIRST_COMPLETED)
         finally:
-            self.pending -= 1
+            if leaving is not None:
+                leaving.cancel()
+        if answer in done:
+            return None
+        if leaving in done:
+            return ClientGone("whoever asked has gone away")
+        return TooLate(
+            f"it was not done within {self._deadline_s:g} s (ONELOOK_DEADLINE_S), and nothing was changed; send fewer or smaller views"
+        )
+
+    def _give_up(self, turn: Turn, future: Future[Any]) -> bool:
+        """Whether it could be: not where it writes already."""
+        if not turn.call_off():
+            return False
+        if not future.cancel():
+            with self._lock:
+                if not future.done():
+                    self._given_up[turn] = time.monotonic()
+        return True
 
     def stop(self) -> None:
         """From now on nothing new is begun, neither of what comes nor of what waits."""
@@ -86,17 +145,52 @@ class WorkQueue:
 
     async def finished(self) -> None:
         """Returns once nothing runs any more."""
-        while self.running:
-            await anyio.sleep(POLL_S)
+        while self._running > len(self._given_up):  # those never write
+            await asyncio.sleep(POLL_S)
+        self._threads.shutdown(wait=False, cancel_futures=True)
+
+    def stuck_s(self) -> float | None:
+        """For how long all workers have been held by work that nobody waits for any more; None where one is not."""
+        with self._lock:
+            return time.monotonic() - max(self._given_up.values()) if len(self._given_up) >= self._workers else None
+
+    def _require_place(self) -> None:
+        self._require_open()
+        if self._pending >= self._workers + self._queue:
+            self._on_refusal("full")
+            raise self._busy(f"{self._pending} requests are being worked on or wait (ONELOOK_QUEUE)")
+
+    def _busy(self, why: str) -> Busy:
+        wait_s = max(1, math.ceil(self._piece_s * self._pending / self._workers))
+        return Busy(f"{why}; send it again in {wait_s} s", wait_s)
 
     def _require_open(self) -> None:
         if self._stopping:
             self._on_refusal("stopping")
             raise Busy(f"the service is stopping; send it again in {RESTART_S} s, when it may have started anew", RESTART_S)
 
-    def _timed(self, work: Callable[[], T]) -> T:
+    def _piece(self, turn: Turn, work: Callable[[], T], context: Context, arrived: float) -> T:
+        """In a thread of the pool."""
+        self._require_open()
+        turn.require()
         start = time.perf_counter()
+        self._on_start(start - arrived)
+        with self._lock:
+            self._running += 1
         try:
-            return work()
+            return context.run(_with_turn, turn, work)
         finally:
+            with self._lock:
+                self._running -= 1
+                self._given_up.pop(turn, None)
             self._piece_s = MEMORY * self._piece_s + (1 - MEMORY) * (time.perf_counter() - start)
+
+    def _leave(self) -> None:
+        with self._lock:
+            self._pending -= 1
+
+
+def _with_turn(turn: Turn, work: Callable[[], T]) -> T:
+    present.set(turn)
+    before_change.set(turn.begin_writing)
+    return work()

@@ -221,7 +221,7 @@ class Memory:
         self.instances.reload()
         return result
 
-    def ping(self) -> None:
+    def require_sound(self) -> None:
         """Raises Unavailable where the memory cannot be read, or could not be written the last time and still cannot."""
         self._connection.require_sound()
 

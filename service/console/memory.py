@@ -71,7 +71,7 @@ def calibrate(agent: AgentDep, actor: ActorDep, percent: Annotated[float | None,
 async def backup(request: Request, agent: AgentDep, work: WorkDep, actor: ActorDep) -> RedirectResponse:
     """Copies all of it beside the memory."""
     settings: Settings = request.app.state.settings
-    await work.run(lambda: agent.upkeep.backup(settings.backups, actor=actor))
+    await work.run_endless(lambda: agent.upkeep.backup(settings.backups, actor=actor))
     return _after(agent, "backup")
 
 

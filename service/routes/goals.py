@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Query
@@ -25,7 +26,7 @@ def goal(agent: Agent, goal_id: str) -> Goal:
 MADE = {"/v1/categories/{category_id}/goals": goal}
 """What a repeated request is answered with where its first answer was lost."""
 
-SourceDep = Annotated[Source, Depends(read_source(Seen))]
+SourceDep = Annotated[Callable[[], Source], Depends(read_source(Seen))]
 
 
 @router.post(
@@ -36,9 +37,13 @@ SourceDep = Annotated[Source, Depends(read_source(Seen))]
 )
 async def create_goal(category_id: str, source: SourceDep, query: Annotated[GoalQuery, Query()], agent: AgentDep, work: WorkDep) -> Goal:
     """Keeps how an object of the category stands now, in a burst or in an earlier observation, as where others shall end."""
-    return await work.run(
-        lambda: Goal.of(agent.rearranging.show(category_id, source.burst_or_id, name=query.name, anchor=query.anchor, frame=source.frame))
-    )
+
+    def show() -> Goal:
+        sent = source()
+        shown = agent.rearranging.show(category_id, sent.burst_or_id, name=query.name, anchor=query.anchor, frame=sent.frame)
+        return Goal.of(shown)
+
+    return await work.run(show)
 
 
 @router.get("/v1/categories/{category_id}/goals", responses=problems(404, 422))
@@ -63,6 +68,9 @@ def delete_goal(goal_id: str, agent: AgentDep) -> None:
 async def plan(goal_id: str, source: SourceDep, query: Annotated[PlanQuery, Query()], agent: AgentDep, work: WorkDep) -> Plan:
     """The rigid motion that takes the object of a burst, or of an earlier observation, to the goal; both in one world frame."""
     up = query.options_up()
-    return await work.run(
-        lambda: Plan.of(agent.rearranging.plan(goal_id, source.burst_or_id, anchor=query.anchor, up=up, frame=source.frame))
-    )
+
+    def planned() -> Plan:
+        sent = source()
+        return Plan.of(agent.rearranging.plan(goal_id, sent.burst_or_id, anchor=query.anchor, up=up, frame=sent.frame))
+
+    return await work.run(planned)

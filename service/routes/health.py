@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from importlib.metadata import version
 
-from fastapi import APIRouter
+from fastapi import APIRouter, Request
 
+from core.errors import OneLookError, Unavailable
 from service.auth import GuardedRoute
 from service.deps import AgentDep
 from service.schemas.info import Health, Info
@@ -21,9 +22,22 @@ def healthz() -> Health:
 
 
 @router.get("/readyz", responses=problems(503))
-def readyz(agent: AgentDep) -> Health:
-    """The backbone is loaded and the memory answers."""
-    agent.memory.ping()
+def readyz(request: Request, agent: AgentDep) -> Health:
+    """The backbone is loaded and works, the memory can be read and written, and a worker is there for whoever asks."""
+    wrong = []
+    for part in (agent.memory, agent.backbone):
+        try:
+            part.require_sound()
+        except OneLookError as error:
+            wrong.append(str(error))
+    stuck_s = request.app.state.work.stuck_s()
+    if stuck_s is not None:
+        wrong.append(
+            f"all workers have been held for {stuck_s:.0f} s by requests that were given up (ONELOOK_DEADLINE_S): if this does not end, "
+            "the backbone or the disk hangs; start the service again"
+        )
+    if wrong:
+        raise Unavailable("; and ".join(wrong))
     return Health()
 
 

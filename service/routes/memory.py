@@ -44,7 +44,7 @@ def calibrate_memory(calibrate: Calibrate, agent: AgentDep, actor: ActorDep) -> 
 async def backup_memory(agent: AgentDep, work: WorkDep, request: Request, actor: ActorDep) -> Backup:
     """Copies the whole memory, while it is used, to a new folder in ONELOOK_BACKUP_DIR; the copy opens as a memory."""
     settings: Settings = request.app.state.settings
-    return await work.run(lambda: Backup.of(agent.upkeep.backup(settings.backups, actor=actor)))
+    return await work.run_endless(lambda: Backup.of(agent.upkeep.backup(settings.backups, actor=actor)))
 
 
 @live.post(
@@ -59,7 +59,7 @@ async def export_memory(
     folder = tempfile.TemporaryDirectory()
     path = Path(folder.name) / "memory.zip"
     try:
-        await work.run(lambda: agent.upkeep.export(path, query.category_id or None, actor=actor))
+        await work.run_endless(lambda: agent.upkeep.export(path, query.category_id or None, actor=actor))
     except BaseException:
         folder.cleanup()
         raise
@@ -73,7 +73,7 @@ async def import_memory(request: Request, agent: AgentDep, work: WorkDep, actor:
     if media_type(request) != ARCHIVE:
         raise HTTPException(415, f"the body is {media_type(request) or 'of no media type'}; send the file of an export as {ARCHIVE}")
     body = await request.body()
-    return await work.run(lambda: _import(agent, body, actor))
+    return await work.run_endless(lambda: _import(agent, body, actor))
 
 
 @router.get("/v1/memory/audit", responses=problems(422))

@@ -30,9 +30,13 @@ Answer = Observation | Detection3DArray
 @router.post("", status_code=201, responses=problems(404, 413, 415, 422, 503), openapi_extra={"requestBody": BURST_BODY})
 async def observe(upload: UploadDep, query: Annotated[NewObservationQuery, Query()], agent: AgentDep, work: WorkDep) -> Answer:
     """Decides what a burst shows: a known object is answered with its pose and joins its category, a novel one with a scan to carry out."""
-    burst = _first_views(upload.burst, query.views_used)
     options = query.options()
-    return await work.run(lambda: _answer(agent, agent.observe(burst, options, frame=upload.frame), query))
+
+    def decide() -> Answer:
+        sent = upload()
+        return _answer(agent, agent.observe(_first_views(sent.burst, query.views_used), options, frame=sent.frame), query)
+
+    return await work.run(decide)
 
 
 @router.get("", responses=problems(404, 422))

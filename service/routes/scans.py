@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Annotated
 
 from fastapi import APIRouter, Depends, Query
@@ -21,11 +22,14 @@ router = APIRouter(prefix="/v1/scans", tags=["scans"], route_class=MemoryRoute)
 
 @router.post("", status_code=201, responses=problems(404, 413, 415, 422, 503), openapi_extra={"requestBody": burst_or("ScanBegin")})
 async def begin_scan(
-    source: Annotated[Source, Depends(read_source(ScanBegin))], query: Annotated[ScanQuery, Query()], agent: AgentDep, work: WorkDep
+    source: Annotated[Callable[[], Source], Depends(read_source(ScanBegin))],
+    query: Annotated[ScanQuery, Query()],
+    agent: AgentDep,
+    work: WorkDep,
 ) -> Scan:
     """Viewpoints to look from at the object of a burst, or of an earlier observation: a scan whatever was decided then."""
     options = query.options(agent.config.scan_views)
-    return await work.run(lambda: scan_answer(agent, agent.scanning.begin(source.burst_or_id, options)))
+    return await work.run(lambda: scan_answer(agent, agent.scanning.begin(source().burst_or_id, options)))
 
 
 @router.get("", responses=problems(422))
@@ -55,7 +59,7 @@ def exclude_viewpoints(scan_id: str, unreachable: ScanExclude, agent: AgentDep) 
 @router.post("/{scan_id}/views", responses=problems(404, 409, 413, 415, 422, 503), openapi_extra={"requestBody": BURST_BODY})
 async def add_scan_views(scan_id: str, upload: UploadDep, agent: AgentDep, work: WorkDep) -> Scan:
     """Adds views, one or several at a time, in the world frame of the burst that the scan came from."""
-    return await work.run(lambda: scan_answer(agent, agent.scanning.add(scan_id, upload.burst)))
+    return await work.run(lambda: scan_answer(agent, agent.scanning.add(scan_id, upload().burst)))
 
 
 @router.post("/{scan_id}/complete", status_code=201, responses=problems(404, 409, 422, 503))

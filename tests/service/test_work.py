@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
+from core.errors import Unavailable
 from service.app import create_app
 from service.batching import LARGEST_PASS, BatchingBackbone
 from service.work import Busy, WorkQueue
@@ -45,7 +46,7 @@ def together(batching, gate, stacks):
     def extract(index):
         try:
             found[index] = batching.extract(stacks[index])
-        except ValueError as error:
+        except Unavailable as error:
             found[index] = error
 
     threads = [threading.Thread(target=extract, args=(index,)) for index in range(len(stacks))]
@@ -85,19 +86,57 @@ def test_a_pass_has_a_largest_size(backbone):
     assert sorted(gate.passes) == [2, LARGEST_PASS, LARGEST_PASS]
 
 
-def test_a_failed_pass_fails_for_all_that_were_in_it_and_for_no_other(backbone):
-    class Broken(Gate):
-        def extract(self, stack):
-            super().extract(stack)
-            if len(self.passes) == 2:
-                raise ValueError("out of memory")
-            return self._backbone.extract(stack)
+class Choosy(Gate):
+    """A backbone that fails where a pass has an image of white pixels only, or is larger than memory allows."""
 
-    gate = Broken(backbone)
+    largest = LARGEST_PASS
+
+    def extract(self, stack):
+        found = super().extract(stack)
+        if (stack == 255).all(axis=(1, 2, 3)).any():
+            raise ValueError("NaN in layer 3")
+        if len(stack) > self.largest:
+            raise MemoryError("cannot allocate")
+        return found
+
+
+def test_a_request_that_the_backbone_fails_at_fails_no_other(backbone):
+    gate = Choosy(backbone)
     batching = BatchingBackbone(gate)
-    found = together(batching, gate, [images(0), images(1), images(2)])
-    assert [isinstance(each, ValueError) for each in found] == [False, True, True]
-    assert batching.extract(images(3)).patches.shape[0] == 2
+    found = together(batching, gate, [images(0), np.full_like(images(1), 255), images(2)])
+    assert [isinstance(each, Unavailable) for each in found] == [False, True, False]
+    assert "colour failed (ValueError: NaN in layer 3)" in str(found[1])
+    assert np.array_equal(found[2].cls, backbone.extract(images(2)).cls)
+
+
+def test_a_pass_that_memory_does_not_suffice_for_is_made_in_parts(backbone):
+    gate, told = Choosy(backbone), []
+    gate.largest = 3
+    gate.open.set()
+    batching = BatchingBackbone(gate, told.append)
+    found = batching.extract(images(0, views=9))
+    alone = backbone.extract(images(0, views=9))
+    for name in ("patches", "cls", "attention", "saliency"):
+        assert np.array_equal(getattr(found, name), getattr(alone, name))
+    assert sum(told) == 9
+    assert max(told) <= 3
+    batching.require_sound()
+
+
+def test_a_backbone_that_failed_is_unsound_until_it_works_again(backbone):
+    gate = Choosy(backbone)
+    gate.open.set()
+    batching = BatchingBackbone(gate)
+    gate.largest = 0
+    with pytest.raises(Unavailable, match="MemoryError.*fewer views"):
+        batching.extract(images(0))
+    with pytest.raises(Unavailable, match="MemoryError"):
+        batching.require_sound()
+    gate.largest = LARGEST_PASS
+    batching.require_sound()
+    before = len(gate.passes)
+    batching.require_sound()
+    assert len(gate.passes) == before, "a sound backbone is not tried"
 
 
 def test_who_comes_when_the_queue_is_full_is_sent_away():
