@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -22,6 +23,7 @@ LOOK_S = 0.1
 """How often who waits for a pass looks whether it is still wanted."""
 CPU_ALLOCATOR = "can't allocate memory"
 """What torch's error says there, which is of no class of its own."""
+log = logging.getLogger("onelook")
 
 
 @dataclass(eq=False)
@@ -58,8 +60,8 @@ class BatchingBackbone:
         self._waiting: list[_Ticket] = []
         self._waiting_lock = threading.Lock()
         self._pass_lock = threading.Lock()
-        self._trouble: str | None = None
-        """What the last pass failed of; None where it did not."""
+        self._failed = False
+        """The last pass."""
 
     def extract(self, images: Images) -> Features:
         """See `Backbone.extract`. Raises Unavailable where it fails, and CalledOff where nobody waits for it any more."""
@@ -79,7 +81,7 @@ class BatchingBackbone:
 
     def require_sound(self) -> None:
         """Raises Unavailable where the last pass failed and another one, of one image, still does; one that runs is not waited for."""
-        if self._trouble is None or not self._pass_lock.acquire(blocking=False):
+        if not self._failed or not self._pass_lock.acquire(blocking=False):
             return
         side = EncoderConfig().first_grid * self.patch_size
         try:
@@ -129,21 +131,23 @@ class BatchingBackbone:
         try:
             features = self._backbone.extract(images)
         except Exception as error:
-            self._trouble = f"{type(error).__name__}: {error}"
+            self._failed = True
+            log.error("a pass of %d images failed", len(images), exc_info=error)
             if not _out_of_memory(error) or len(images) == 1:
                 raise
             half = len(images) // 2
             return _joined(self._passed(images[:half]), self._passed(images[half:]))
-        self._trouble = None
+        self._failed = False
         self._on_pass(len(images))
         return features
 
     def _unavailable(self, error: Exception) -> OneLookError:
         if isinstance(error, OneLookError):
             return error
-        found = f"{type(error).__name__}: {str(error).strip().partition(chr(10))[0]}"
-        remedy = "send fewer views, or give the service more memory" if _out_of_memory(error) else "its log says more; start it again"
-        return Unavailable(f"the backbone {self.name} failed ({found}); {remedy}")
+        remedy = (
+            "send fewer views, or give the service more memory" if _out_of_memory(error) else "the log says more; start the service again"
+        )
+        return Unavailable(f"the backbone {self.name} failed ({type(error).__name__}); {remedy}")
 
 
 def _out_of_memory(error: Exception) -> bool:

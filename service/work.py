@@ -179,6 +179,10 @@ class WorkQueue:
             self._running += 1
         try:
             return context.run(_with_turn, turn, work)
+        except Exception:
+            raise
+        except BaseException as error:  # of a library that ends what it takes for its own process; this one goes on
+            raise Unavailable(f"the worker was ended ({error!r}); the next request gets another one") from error
         finally:
             with self._lock:
                 self._running -= 1

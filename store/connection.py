@@ -7,7 +7,7 @@ import sqlite3
 import threading
 import uuid
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, contextmanager
 from contextvars import ContextVar
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ from typing import Any
 from sqlite_utils import Database
 
 from core.errors import Conflict, Unavailable
-from store.folders import FileSum, new_folder, sums, sync
+from store.folders import FileSum, new_folder, partial_of, sums
 from store.retention import Retention
 from store.schema import upgrade
 
@@ -30,8 +30,9 @@ before_change: ContextVar[Callable[[], None] | None] = ContextVar("before_change
 """Called before anything of a change is written; raises where whoever asked for the change does not want it any more."""
 
 TRIAL = ".trial"
-"""Name of a file that is written to see whether the disk takes one again; of the size of a small burst."""
+"""Name of a folder that is made to see whether the disk takes one again."""
 TRIAL_BYTES = 1_000_000
+"""What is in it: as much as a small burst."""
 
 running_request: ContextVar[tuple[str, str] | None] = ContextVar("running_request", default=None)
 """Key and route of the repeatable request that the present changes are made for; see store/requests.py."""
@@ -48,8 +49,9 @@ class Connection:
         self.root = root
         self.retention = retention or Retention()
         self._lock = threading.RLock()
-        self._trouble: str | None = None
-        """What the last attempt to write failed of; None where it did not."""
+        self._trial_lock = threading.Lock()
+        self._failed: set[str] = set()
+        """What could not be written the last time: `files`, `rows`, or both."""
         try:
             self._db = Database(sqlite3.connect(root / DATABASE, check_same_thread=False))
         except sqlite3.Error as error:
@@ -85,19 +87,21 @@ class Connection:
     def require_sound(self) -> None:
         """Raises Unavailable where the database cannot be read, or where writing failed the last time and still does."""
         self.rows("SELECT value FROM meta WHERE key = 'memory_version'")
-        if self._trouble is None:
+        if not self._failed:
             return
         trial = self.root / TRIAL
-        try:
-            trial.write_bytes(bytes(TRIAL_BYTES))
-            sync(trial)
-        except OSError as error:
-            raise self._unwritable(error) from error
-        finally:
-            with suppress(OSError):
-                trial.unlink(missing_ok=True)
-        with self.housekeeping():
-            pass
+        with self._trial_lock:
+            self.remove([trial, partial_of(trial)])  # of a process that was stopped here
+            try:
+                with new_folder(trial) as partial:
+                    (partial / "trial").write_bytes(bytes(TRIAL_BYTES))
+            except OSError as error:
+                raise self._unwritable("files", error) from error
+            finally:
+                self.remove([trial])
+            self._failed.discard("files")
+            with self.housekeeping():
+                pass
 
     @contextmanager
     def change(self, made: str | None = None) -> Iterator[Database]:
@@ -120,13 +124,13 @@ class Connection:
             with self._lock, self._db.atomic():
                 self._db.execute(TAKE_TURN)
                 yield self._db
-            self._trouble = None
+            self._failed.discard("rows")
         except sqlite3.IntegrityError as error:
             raise Conflict("a category, scan or observation that this needs was deleted meanwhile; send the request again") from error
         except sqlite3.ProgrammingError:
             raise
         except sqlite3.DatabaseError as error:
-            raise self._unwritable(error) from error
+            raise self._unwritable("rows", error) from error
 
     def create(
         self,
@@ -160,7 +164,8 @@ class Connection:
                         write(partial)
                         files[folder] = sums(partial)
                 except OSError as error:
-                    raise self._unwritable(error) from error
+                    raise self._unwritable("files", error) from error
+            self._failed.discard("files")
             with self.change(made) as db:
                 insert(db, files)
             undo.pop_all()
@@ -175,8 +180,8 @@ class Connection:
         if ask is not None:
             ask()
 
-    def _unwritable(self, error: Exception) -> Unavailable:
-        self._trouble = str(error)
+    def _unwritable(self, what: str, error: Exception) -> Unavailable:
+        self._failed.add(what)
         return Unavailable(f"cannot write to the memory in {self.root}: {error}; free space or set another ONELOOK_DATA_DIR")
 
 

@@ -34,10 +34,15 @@ Files = Mapping[str, FileSum]
 """The files of a folder, by name; every array and every picture is in it."""
 
 
+def partial_of(final: Path) -> Path:
+    """Where a folder is until it is whole."""
+    return final.with_name(PARTIAL + final.name)
+
+
 @contextmanager
 def new_folder(final: Path) -> Iterator[Path]:
     """A folder to write into; it gets the name `final` once everything in it is on the disk, and is removed on an error."""
-    partial = final.with_name(PARTIAL + final.name)
+    partial = partial_of(final)
     make_parents(partial)
     partial.mkdir()
     try:

@@ -7,6 +7,7 @@ more, so that no `finally` tidies up what a dead process could not have.
 
 from __future__ import annotations
 
+import errno
 import os
 import shutil
 import sqlite3
@@ -218,13 +219,13 @@ def _reached(disk: Disk, kind: str, path: Path, tear: Callable[[], object]) -> b
 
 
 def failing(error: int, *kinds: str) -> Fault:
-    """Calls of these kinds fail with an errno; a transaction's commit fails as SQLite reports it."""
+    """Calls of these kinds fail with an errno; what fails within SQLite is reported as SQLite does."""
 
     def fault(kind: str, path: Path) -> None:
         if kind not in kinds:
             return
-        if kind == "commit":
-            raise sqlite3.OperationalError("database or disk is full" if os.strerror(error) == os.strerror(28) else "disk I/O error")
+        if kind in {"begin", "commit"}:
+            raise sqlite3.OperationalError("database or disk is full" if error == errno.ENOSPC else "disk I/O error")
         raise OSError(error, os.strerror(error), str(path))
 
     return fault

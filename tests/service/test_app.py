@@ -10,6 +10,7 @@ from fastapi.testclient import TestClient
 
 import service.app
 from core.errors import Conflict, InvalidInput, OneLookError
+from service.agent import Agent
 from service.app import create_app
 from service.auth import TooOften
 from service.errors import KINDS, problem_of
@@ -74,12 +75,12 @@ def test_a_method_that_is_not_answered_is_a_problem(client):
     assert answer.headers["allow"] == "GET"
 
 
-def test_the_unexpected_is_a_problem_without_a_trace(settings, backbone, look, parts):
-    class Broken(type(backbone)):
-        def extract(self, images):
-            raise RuntimeError("secret detail")
+def test_the_unexpected_is_a_problem_without_a_trace(settings, backbone, look, parts, monkeypatch):
+    def broken(*args, **options):
+        raise RuntimeError("secret detail")
 
-    with TestClient(create_app(settings, backbone=Broken()), raise_server_exceptions=False) as client:
+    monkeypatch.setattr(Agent, "observe", broken)
+    with TestClient(create_app(settings, backbone=backbone), raise_server_exceptions=False) as client:
         answer = client.post("/v1/observations", files=parts(look()))
     assert (answer.status_code, answer.headers["content-type"]) == (500, "application/problem+json")
     assert "secret" not in answer.text

@@ -105,7 +105,7 @@ def test_a_request_that_the_backbone_fails_at_fails_no_other(backbone):
     batching = BatchingBackbone(gate)
     found = together(batching, gate, [images(0), np.full_like(images(1), 255), images(2)])
     assert [isinstance(each, Unavailable) for each in found] == [False, True, False]
-    assert "colour failed (ValueError: NaN in layer 3)" in str(found[1])
+    assert "colour failed (ValueError)" in str(found[1])
     assert np.array_equal(found[2].cls, backbone.extract(images(2)).cls)
 
 
