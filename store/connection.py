@@ -165,7 +165,7 @@ class Connection:
                         files[folder] = sums(partial)
                 except OSError as error:
                     raise self._unwritable("files", error) from error
-            self._failed.discard("files")
+                self._failed.discard("files")
             with self.change(made) as db:
                 insert(db, files)
             undo.pop_all()

@@ -102,6 +102,20 @@ def test_links_lead_somewhere(page: Path) -> None:
             assert anchor in {re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-") for heading in headings}, target
 
 
+def test_every_named_test_exists() -> None:
+    named = set(re.findall(r"`(tests/[\w/]+\.py)`", TEXT))
+    assert named
+    assert [name for name in sorted(named) if not (ROOT / name).is_file()] == []
+
+
+@pytest.mark.parametrize(("page", "heading"), [("operations.md", "What it survives"), ("security.md", "Threats")])
+def test_every_promise_names_its_test(page: str, heading: str) -> None:
+    section = (ROOT / "docs" / page).read_text().partition(f"## {heading}\n")[2].partition("\n## ")[0]
+    promises = [line for line in section.splitlines() if line.startswith("| ")][1:]
+    assert len(promises) > 5
+    assert [line for line in promises if not re.search(r"`tests/[\w/]+\.py`[^|]*\|$", line)] == []
+
+
 def test_the_example_burst_is_of_the_recording_it_is_shown_with(samples: Path) -> None:
     example = json.loads((ROOT / "docs" / "burst.json").read_text())
     recording = samples / "cup" / "cup_1"
