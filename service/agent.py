@@ -10,7 +10,7 @@ from core.agreement import agreeing
 from core.boxes import OrientedBox
 from core.clock import StageClock
 from core.encode import EncodedBurst, Encoder
-from core.errors import InvalidInput, NoPose, Unavailable
+from core.errors import Conflict, InvalidInput, NoPose, NotFound, Unavailable
 from core.grounds import grounds
 from core.matches import PoseEstimate
 from core.novelty import DEFAULT_SCORE, Decision, DecisionConfig
@@ -73,6 +73,8 @@ class ObserveOptions:
 
 
 WITHOUT_DEPTH = "pnp"
+DECISIONS = 3
+"""For one burst at most: what was decided for may be deleted before the answer is kept; then it is decided anew."""
 _PoseOrReason = tuple[PoseEstimate | None, Pose | None, str | None]
 """What was estimated and what is kept of it; or why there is nothing."""
 
@@ -106,6 +108,18 @@ class Agent:
         clock = StageClock()
         encoded = agreeing(self.encoder.encode(burst))
         clock.lap("encode")
+        for _ in range(DECISIONS - 1):
+            try:
+                return self._answer(burst, encoded, options, estimator, clock, frame)
+            except (NotFound, Conflict):
+                if options.category_id is not None:
+                    raise
+        return self._answer(burst, encoded, options, estimator, clock, frame)
+
+    def _answer(
+        self, burst: Burst, encoded: EncodedBurst, options: ObserveOptions, estimator: PoseEstimator, clock: StageClock, frame: str | None
+    ) -> Observation:
+        """Raises NotFound or Conflict where the category that was decided for is deleted meanwhile."""
         judge = Judge(self.memory, encoded, self.backbone.whitening, options.seed)
         judged = None if options.category_id is not None else self._judge(judge, options)
         decision = judged.decision if judged else None

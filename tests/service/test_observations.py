@@ -258,3 +258,36 @@ def test_a_known_object_in_the_shape_of_vision_msgs(client, seen):
 def test_a_novel_object_is_no_detection(client, look, parts):
     array = client.post("/v1/observations", files=parts(look()), params={"format": "vision_msgs"}).json()
     assert array["detections"] == []
+
+
+@pytest.mark.parametrize("moment", ["reference", "create"])
+def test_what_is_deleted_while_it_is_decided_for_is_decided_anew(client, look, parts, learn, monkeypatch, moment):
+    """Before its reference is read, or after, before the answer is kept."""
+    category = learn()
+    memory = client.app.state.agent.memory
+    place = memory.categories if moment == "reference" else memory.observations
+    kept = getattr(place, moment)
+
+    def deleted_first(*args, **options):
+        if memory.categories.all():
+            memory.categories.delete(category["id"])
+        return kept(*args, **options)
+
+    monkeypatch.setattr(place, moment, deleted_first)
+    answer = client.post("/v1/observations", files=parts(look()))
+    assert (answer.status_code, answer.json()["outcome"]) == (201, "novel")
+    assert len(client.get("/v1/observations").json()["observations"]) == 2  # that of learning, and this one
+
+
+def test_a_category_that_the_caller_names_is_not_decided_anew(client, look, parts, learn, monkeypatch):
+    category = learn()
+    memory = client.app.state.agent.memory
+    kept = memory.categories.reference
+
+    def deleted_first(category_id):
+        memory.categories.delete(category_id)
+        return kept(category_id)
+
+    monkeypatch.setattr(memory.categories, "reference", deleted_first)
+    answer = client.post("/v1/observations", files=parts(look()), params={"category_id": category["id"]})
+    assert answer.status_code == 404

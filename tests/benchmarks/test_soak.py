@@ -1,0 +1,38 @@
+"""A short soak of a real process with a fast backbone: hundreds of errands do not make it grow. `make soak` is the long one."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from benchmarks import soak
+
+ROOT = Path(__file__).parents[2]
+MINUTES = 0.4
+MOST_GROWTH = 0.05
+
+
+@pytest.fixture
+def process(tmp_path: Path) -> Iterator[str]:
+    """The address of a service in a process of its own."""
+    command = [sys.executable, str(ROOT / "tests" / "service" / "slow_service.py"), str(tmp_path / "memory"), "0", "1"]
+    environment = os.environ | {"PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"} | soak.SETTINGS
+    with (
+        (tmp_path / "log").open("w") as log,
+        subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log, text=True, env=environment) as child,
+    ):
+        try:
+            yield child.stdout.readline().strip()
+        finally:
+            child.kill()
+
+
+def test_hundreds_of_errands_leave_the_process_as_it_was(process: str, recorded: Path, tmp_path: Path) -> None:
+    result = soak.run(MINUTES, MOST_GROWTH, plot=tmp_path / "soak.png", robots=2, views=3, data=recorded, url=process)
+    assert result.answered > 30
+    assert result.refused == 0  # two robots for a worker and four places
