@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from core.coherence import incoherent
 from core.encode import EncodedBurst
 from core.quality import ViewFault, faults, region_of_encoded
 from core.views import Burst
@@ -41,7 +42,8 @@ class Grounds:
 def grounds(burst: Burst, encoded: EncodedBurst) -> Grounds:
     """Of a burst and its encoding."""
     shown = [view for view in encoded.views if len(view.cells)]
-    found = tuple(faults(view, region_of_encoded(seen)) for view, seen in zip(burst.views, encoded.views))
+    alone = (faults(view, region_of_encoded(seen)) for view, seen in zip(burst.views, encoded.views))
+    found = tuple(own + beside for own, beside in zip(alone, incoherent(burst, encoded)))
     return Grounds(len(burst), len(shown), sum(bool(view.trusted.any()) for view in shown), _spread_deg(encoded), found)
 
 

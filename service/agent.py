@@ -9,6 +9,7 @@ import numpy as np
 from core.agreement import agreeing
 from core.boxes import OrientedBox
 from core.clock import StageClock
+from core.coherence import require_one_unit
 from core.encode import EncodedBurst, Encoder
 from core.errors import Conflict, InvalidInput, NoPose, NotFound, Unavailable
 from core.grounds import grounds
@@ -107,6 +108,7 @@ class Agent:
             self.memory.categories.get(options.category_id)
         clock = StageClock()
         encoded = agreeing(self.encoder.encode(burst))
+        require_one_unit(encoded)
         clock.lap("encode")
         for _ in range(DECISIONS - 1):
             try:

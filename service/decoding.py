@@ -18,8 +18,11 @@ from core.errors import InvalidInput
 from core.views import Burst, Camera, View
 from service.errors import field_path
 from service.images import decode_colour, decode_depth, decode_mask
+from service.plausibility import plausible
 from service.schemas.bursts import BurstPart, matrix
 
+ABOUT_BYTES = 8192
+"""Of JSON for a view; its 25 numbers take a tenth of it."""
 FloatArray = NDArray[np.floating]
 
 
@@ -65,13 +68,14 @@ class Upload:
 
 def decode_parts(parts: Parts, limits: BurstLimits) -> Upload:
     """From multipart/form-data. Raises InvalidInput naming the part that is wrong."""
-    about = _about(parts.burst)
+    about = _about(parts.burst, limits)
     views = len(parts.rgb)
     limits.require_views("rgb", views)
     for name, found in (("depth", len(parts.depth)), ("mask", len(parts.mask)), ("burst.views", len(about.views or ()))):
         if found not in (0, views):
             raise InvalidInput(name, f"has {found} entries for {views} rgb images; send one a view, in the same order, or none")
-    rgb = _images(parts.rgb, "rgb", decode_colour, limits)
+    alone = not (about.views or parts.depth or parts.mask)
+    rgb = _images(parts.rgb, "rgb", lambda content, field: decode_colour(content, field, upright=alone), limits)
     depth_m = [(image * about.depth_scale).astype(np.float32) for image in _images(parts.depth, "depth", decode_depth, limits)]
     mask = _images(parts.mask, "mask", decode_mask, limits)
     cameras = [(matrix(view.K, 3), matrix(view.world_from_camera, 4)) for view in about.views or ()]
@@ -106,7 +110,7 @@ def assemble(
         with _naming(index):
             K, pose = cameras[index] if given else (None, None)
             camera = Camera(K, pose) if K is not None and pose is not None else None
-            views.append(View(image, depth_m[index] if depth_m else None, camera, mask[index] if mask else None))
+            views.append(plausible(View(image, depth_m[index] if depth_m else None, camera, mask[index] if mask else None)))
     return Burst(views)
 
 
@@ -114,12 +118,16 @@ def assemble(
 def _naming(index: int) -> Iterator[None]:
     """A camera or a view does not know its place in the burst; the caller's error names it."""
     try:
-        yield
+        with np.errstate(over="ignore", invalid="ignore"):  # of numbers that are refused
+            yield
     except InvalidInput as error:
         raise InvalidInput(f"views[{index}].{error.field.partition('.')[2]}", error.message) from None
 
 
-def _about(part: str | bytes) -> BurstPart:
+def _about(part: str | bytes, limits: BurstLimits) -> BurstPart:
+    most = ABOUT_BYTES * (limits.views + 1)
+    if len(part) > most:
+        raise InvalidInput("burst", f"has {len(part)} bytes; the cameras of {limits.views} views (ONELOOK_MAX_VIEWS) take less than {most}")
     try:
         return BurstPart.model_validate_json(part)
     except ValidationError as error:

@@ -116,7 +116,13 @@ def field_path(location: Sequence[int | str]) -> str:
 def _on_http_exception(request: Request, error: Exception) -> JSONResponse:
     assert isinstance(error, HTTPException)
     if error.status_code == 400:  # what FastAPI says of a body that is no text
-        return _answer(problem_of(core.InvalidInput("body", "is not JSON: it is not UTF-8 text")))
+        return _answer(
+            problem_of(
+                core.InvalidInput(
+                    "body", "is no JSON that can be read: it is not UTF-8 text, too deeply nested, or has numbers that are too long"
+                )
+            )
+        )
     title = HTTPStatus(error.status_code).phrase
     detail = str(error.detail)
     if error.status_code == 404 and detail == title:

@@ -44,6 +44,8 @@ def decode_npz(body: bytes, limits: BurstLimits) -> Upload:
     K, poses = arrays.get("K"), arrays.get("world_from_camera")
     if K is not None and K.ndim == 2:
         K = arrays["K"] = np.repeat(K[None], views, axis=0)
+    # Whole numbers are of types that cannot be negated.
+    K, poses = (None if each is None else each.astype(float) for each in (K, poses))
     cameras = [(None if K is None else K[view], None if poses is None else poses[view]) for view in range(views)]
     with np.errstate(over="ignore"):  # becomes infinite, which the view refuses
         depth_m = [depth.astype(np.float32) for depth in arrays.get("depth_m", ())]

@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from core.agreement import agreeing
+from core.coherence import require_one_unit
 from core.encode import Encoder
 from core.errors import InvalidInput, TooFewViews
 from core.packing import burst_from_arrays
@@ -48,6 +49,7 @@ class Scanning:
             encoded, observation_id = burst_from_arrays(self._memory.observations.features(source)), source
         else:
             encoded, observation_id = agreeing(self._encoder.encode(source)), None
+            require_one_unit(encoded)
         request = request_scan(encoded, options or ScanOptions(self._viewpoints))
         scan = self._memory.scans.create(request, observation_id)
         self._events.publish("scan_begun", id=scan.id, observation_id=observation_id)
@@ -87,6 +89,7 @@ class Scanning:
             found = f"the scan has {scan.views} of at least {MIN_VIEWS} views"
             raise TooFewViews("views", f"{found}; send {MIN_VIEWS - scan.views} more to /v1/scans/{scan_id}/views, from other sides")
         encoded = agreeing(self._encoder.encode(burst))
+        require_one_unit(encoded)
         category = self._memory.categories.create(build_reference(encoded), burst, encoded, name=name, scan_id=scan_id, actor=actor)
         self._events.publish("category_created", id=category.id, name=name, scan_id=scan_id)
         return category

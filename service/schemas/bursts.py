@@ -17,7 +17,7 @@ def _square(rows: int) -> BeforeValidator:
             return None
         try:
             numbers = np.asarray(value, dtype=float)
-        except (TypeError, ValueError):  # rows of unequal length, or no numbers
+        except (TypeError, ValueError, OverflowError):  # rows of unequal length, no numbers, or ones of hundreds of digits
             numbers = np.empty(0)
         if numbers.size != rows * rows or numbers.ndim > 2 or not np.isfinite(numbers).all():
             raise ValueError(f"expected {rows}×{rows} finite numbers: {rows} rows of {rows}, or all {rows * rows} row by row")

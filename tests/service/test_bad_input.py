@@ -105,7 +105,7 @@ CASES = {
     "JPEG cut short": (put("rgb", 0, b"\xff\xd8\xff\xe0" + b"\0" * 40), "rgb[0]", ["broken JPEG"]),
     "100 megapixels": (put("rgb", 3, huge_png()), "rgb[3]", ["10000×10000", "at most 16 megapixels"]),
     "tiny image": (put("rgb", 0, png8(8, 8, 3)), "views[0].rgb", ["8×8 pixels"]),
-    "8-bit depth": (put("depth", 1, png8(160, 160)), "depth[1]", ["8-bit PNG", "16-bit PNG"]),
+    "8-bit depth": (put("depth", 1, png8(160, 160)), "depth[1]", ["PNG of 8 bits and 1 channel", "16-bit PNG"]),
     "JPEG depth": (put("depth", 0, b"\xff\xd8\xff\xe0"), "depth[0]", ["is a JPEG file", "16-bit PNG"]),
     "depth all zero": (zero_depth, "views[1].depth", ["zero everywhere"]),
     "depth of another size": (small_depth, "views[1].depth", ["160×160"]),

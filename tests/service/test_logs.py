@@ -10,6 +10,7 @@ import logging.config
 import pytest
 from fastapi.testclient import TestClient
 
+from service.agent import Agent
 from service.app import create_app
 from service.logs import config, request_id
 
@@ -106,12 +107,12 @@ def test_a_failure_is_told_with_its_traceback_and_its_request(written):
     assert "broken disk" in line["exception"]
 
 
-def test_what_nobody_expected_is_answered_with_the_id_to_look_for(settings, backbone, look, parts):
-    class Broken(type(backbone)):
-        def extract(self, images):
-            raise RuntimeError("out of order")
+def test_what_nobody_expected_is_answered_with_the_id_to_look_for(settings, backbone, look, parts, monkeypatch):
+    def broken(*args, **options):
+        raise RuntimeError("out of order")
 
-    with TestClient(create_app(settings, backbone=Broken()), raise_server_exceptions=False) as client:
+    monkeypatch.setattr(Agent, "observe", broken)
+    with TestClient(create_app(settings, backbone=backbone), raise_server_exceptions=False) as client:
         answer = client.post("/v1/observations", files=parts(look()), headers={"X-Request-Id": "r2"})
     assert (answer.status_code, answer.headers["x-request-id"]) == (500, "r2")
 

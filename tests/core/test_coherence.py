@@ -1,0 +1,110 @@
+"""Views that do not fit together are told apart from views that do."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from core.coherence import incoherent, require_one_unit
+from core.encode import Encoder
+from core.errors import InvalidInput
+from core.scan import hemisphere
+from core.sim3 import Sim3
+from core.views import Burst, Camera
+
+UP = np.array([0.0, 0.0, 1.0])
+
+
+@pytest.fixture
+def look(ellipsoid):
+    """look(at, views, color): a burst around an object."""
+
+    def burst(at=(0.0, 0.0, 0.0), views=5, colour=(190, 60)):
+        placed = Sim3(1.0, np.eye(3), np.array(at))
+        poses = hemisphere(placed.translation, UP, 0.5, views)
+        return Burst([ellipsoid(np.array([0.1, 0.07, 0.05]), colour).view(placed, pose) for pose in poses])
+
+    return burst
+
+
+def with_translations(burst, times):
+    """The same images and depth from cameras whose translations are in another unit."""
+
+    def view(each):
+        pose = each.camera.world_from_camera.copy()
+        pose[:3, 3] *= times
+        return replace(each, camera=Camera(each.camera.K, pose))
+
+    return Burst([view(each) for each in burst.views])
+
+
+def with_depth(burst, times):
+    return Burst([replace(each, depth_m=each.depth_m * np.float32(times)) for each in burst.views])
+
+
+@pytest.mark.parametrize("views", [2, 3, 8])
+@pytest.mark.parametrize("at", [(0, 0, 0), (3, -2, 1)])
+def test_metres_throughout_are_one_unit(look, backbone, views, at):
+    require_one_unit(Encoder(backbone).encode(look(at, views)))
+
+
+@pytest.mark.parametrize(
+    ("change", "times"), [*((with_translations, each) for each in (1000, 10, 0.1, 0.001)), (with_depth, 10), (with_depth, 0.1)]
+)
+def test_another_unit_of_cameras_or_of_depth_is_refused(look, backbone, change, times):
+    with pytest.raises(InvalidInput, match=r"depth says .* world_from_camera says .* metres"):
+        require_one_unit(Encoder(backbone).encode(change(look(), times)))
+
+
+def test_views_from_one_side_do_not_tell(look, backbone, ellipsoid):
+    """Rays that are nearly parallel meet anywhere."""
+    pose = hemisphere(np.zeros(3), UP, 0.5, 1)[0]
+    beside = pose.copy()
+    beside[:3, 3] += 0.005 * pose[:3, 0]
+    shown = ellipsoid(np.array([0.1, 0.07, 0.05]))
+    burst = Burst([shown.view(Sim3.identity(), each) for each in (pose, beside)])
+    require_one_unit(Encoder(backbone).encode(with_depth(burst, 5)))
+
+
+def test_one_view_and_views_without_depth_do_not_tell(look, backbone):
+    encoder = Encoder(backbone)
+    require_one_unit(encoder.encode(look(views=1)))
+    flat = Burst([replace(each, depth_m=None) for each in look().views])
+    require_one_unit(encoder.encode(flat))
+    assert incoherent(flat, encoder.encode(flat)) == ((),) * 5
+
+
+def test_cameras_at_one_place_that_look_elsewhere_do_not_tell(look, backbone):
+    burst = look(views=3)
+    here = burst.views[0].camera.world_from_camera[:3, 3]
+
+    def moved(view):
+        pose = view.camera.world_from_camera.copy()
+        pose[:3, 3] = here
+        return replace(view, camera=Camera(view.camera.K, pose))
+
+    require_one_unit(Encoder(backbone).encode(Burst([moved(each) for each in burst.views])))
+
+
+def test_a_view_of_something_elsewhere_is_named(look, backbone):
+    mixed = Burst(look(views=4).views + look((1.0, 0, 0), 1, colour=(80, 40)).views)
+    encoded = Encoder(backbone).encode(mixed)
+    *rest, odd = incoherent(mixed, encoded)
+    assert rest == [()] * 4
+    assert [(fault.kind, "1 m from where" in fault.detail) for fault in odd] == [("elsewhere", True)]
+    require_one_unit(encoded)
+
+
+def test_views_of_one_object_are_nowhere_else(look, backbone):
+    burst = look(views=8)
+    assert incoherent(burst, Encoder(backbone).encode(burst)) == ((),) * 8
+
+
+def test_the_same_image_again_is_named_whatever_its_camera(look, backbone):
+    burst = look(views=4)
+    stuck = Burst([*burst.views, burst.views[1], replace(burst.views[2], camera=burst.views[3].camera)])
+    faults = incoherent(stuck, Encoder(backbone).encode(stuck))
+    assert [[fault.kind for fault in view if fault.kind == "copy"] for view in faults] == [[], [], [], [], ["copy"], ["copy"]]
+    assert "view 1" in faults[4][0].detail
