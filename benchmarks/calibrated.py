@@ -33,6 +33,10 @@ class Answers:
     """Of those, called known."""
     unknown_uncertain: IntArray
     """Of those, called uncertain."""
+    new: IntArray
+    """Of those, the first of their kind to be presented: later ones are of kinds that were called uncertain before, so harder."""
+    new_false_known: IntArray
+    """Of these, called known."""
     holding: IntArray
     """Of a category that the memory holds."""
     missed: IntArray
@@ -58,9 +62,10 @@ def episode(pairs: BestPairs, labels: NDArray[np.intp], order: Sequence[int], ra
     source = BestSource(pairs, len(order))
     source.begin(len(rates))
     met: set[int] = set()
+    kinds: set[int] = set()
     for position, burst in enumerate(order):
         label = int(labels[burst])
-        threshold, uncertain_above, learn_above = _levels(rivals, rates, kind)
+        threshold, uncertain_above, learn_above, likely_above = _levels(rivals, rates, kind)
         chosen, evidence = source.nearest(burst, used)
         known = evidence > threshold
         uncertain = ~known & (evidence > uncertain_above)
@@ -73,14 +78,17 @@ def episode(pairs: BestPairs, labels: NDArray[np.intp], order: Sequence[int], ra
                 ("unknown", ~held),
                 ("false_known", ~held & known),
                 ("unknown_uncertain", ~held & uncertain),
+                ("new", ~held & (label not in kinds)),
+                ("new_false_known", ~held & known & (label not in kinds)),
                 ("holding", held),
                 ("missed", held & novel),
                 ("mistaken", held & wrong),
                 ("holding_uncertain", held & uncertain),
             ):
                 counts[name] += which
-        best_wrong = _best_wrong(source, burst, used, chosen, known, evidence)
-        for row in np.flatnonzero(~uncertain & np.isfinite(best_wrong)):
+        likely = known | (uncertain & (evidence > likely_above))
+        best_wrong = _best_wrong(source, burst, used, chosen, likely, evidence)
+        for row in np.flatnonzero(np.isfinite(best_wrong)):
             rivals[row].append(float(best_wrong[row]))
         learnt = np.flatnonzero(novel | (evidence > learn_above))
         place = np.where(novel, used, chosen)[learnt]
@@ -88,6 +96,7 @@ def episode(pairs: BestPairs, labels: NDArray[np.intp], order: Sequence[int], ra
         source.learn(burst, place, learnt)
         used = used + novel
         met.add(burst)
+        kinds.add(label)
     counts["categories"] = used
     return Answers(**{name: each[None] for name, each in counts.items()})
 
@@ -102,11 +111,11 @@ def _best_wrong(
     return np.where(known, others[:, 0], evidence)
 
 
-def _levels(rivals: Sequence[Sequence[float]], rates: Sequence[float], prior: Samples) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Threshold, lower and learning level of each rate, each (T,)."""
+def _levels(rivals: Sequence[Sequence[float]], rates: Sequence[float], prior: Samples) -> FloatArray:
+    """Threshold, lower and learning level of each rate, and where right and wrong are as likely, shape (4, T)."""
     levels = []
     for values, rate in zip(rivals, rates):
         calibration = Calibration.fit(values, prior)
-        levels.append([calibration.threshold(min(factor * rate, 0.5)) for factor in (1.0, UNCERTAIN_FACTOR, LEARN_FACTOR)])
-    first, second, third = np.array(levels).T
-    return first, second, third
+        quantiles = [calibration.threshold(min(factor * rate, 0.5)) for factor in (1.0, UNCERTAIN_FACTOR, LEARN_FACTOR)]
+        levels.append([*quantiles, calibration.even])
+    return np.array(levels).T

@@ -54,6 +54,7 @@ SUMMARY = ("score", "auroc", "nearest", "fn_at_zero_fp", "fn_at_one_fp", "defaul
 RATE_COLUMNS = (
     "score",
     "asked_percent",
+    "new_false_known",
     "false_known_percent",
     "unknown_uncertain",
     "mistaken",
@@ -189,6 +190,7 @@ def rate_rows(name: str, pairs: BestPairs, labels: NDArray[np.intp], orders: lis
         )
 
     columns = {
+        "new_false_known": percent("new_false_known", "new"),
         "false_known_percent": percent("false_known", "unknown"),
         "unknown_uncertain": percent("unknown_uncertain", "unknown"),
         "mistaken": percent("mistaken", "holding"),

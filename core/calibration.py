@@ -90,9 +90,16 @@ class Calibration:
 
     def probability(self, evidence: float) -> float:
         """That the most similar category is right, with even odds beforehand; grows with the evidence."""
-        apart = max(self.own_location - self.location, self.spread)
-        middle = self.location + apart / 2
-        return float(1 / (1 + np.exp(np.clip(-(evidence - middle) * apart / self.spread**2, -50, 50))))
+        return float(1 / (1 + np.exp(np.clip(-(evidence - self.even) * self._apart / self.spread**2, -50, 50))))
+
+    @property
+    def even(self) -> float:
+        """Evidence with which right and wrong are equally probable."""
+        return self.location + self._apart / 2
+
+    @property
+    def _apart(self) -> float:
+        return max(self.own_location - self.location, self.spread)
 
 
 def _quantiles(values: FloatArray, weights: FloatArray, levels: Sequence[float]) -> FloatArray:

@@ -82,7 +82,8 @@ class Decision:
     verified: bool = False
     """Whether poses of the shortlist took part."""
     rival: float | None = None
-    """Similarity of the best wrong category, as far as the decision tells which is wrong: what later thresholds are made of."""
+    """Similarity of the best wrong category, as far as the decision tells which is wrong: what later thresholds are made of.
+    Of an uncertain one what is more probable counts: leaving these out would leave out the most similar of unknown objects."""
 
     @property
     def similarity(self) -> float | None:
@@ -214,9 +215,8 @@ def _by_evidence(memory: Sequence[Member], target: EncodedBurst, config: Decisio
     )
     best = similarities[0][1] if similarities else -np.inf
     outcome: Outcome = "known" if best > threshold else "uncertain" if best > uncertain_above else "novel"
-    wrong = similarities
-    if outcome == "known" and comparison:
-        wrong = weighed(comparison.ranked(without=similarities[0][0]))
+    likely = outcome == "known" or (outcome == "uncertain" and best > calibration.even)
+    wrong = weighed(comparison.ranked(without=similarities[0][0])) if likely and comparison else similarities
     return Decision(
         outcome,
         config.score,
@@ -226,7 +226,7 @@ def _by_evidence(memory: Sequence[Member], target: EncodedBurst, config: Decisio
         learn_above,
         calibration.probability(best) if similarities else None,
         verified,
-        wrong[0][1] if wrong and outcome != "uncertain" else None,
+        wrong[0][1] if wrong else None,
     )
 
 

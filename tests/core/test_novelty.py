@@ -142,7 +142,15 @@ def test_between_the_levels_the_answer_is_uncertain_and_names_candidates(painted
     assert {"uncertain", "known"} <= set(outcomes)
     unsure = decide(SIX_KINDS, burst, DecisionConfig(false_known_rate=rates[outcomes.index("uncertain")]))
     assert unsure.candidates[0] == clear.similarities[0][0] == "kind 2"
-    assert unsure.rival is None
+
+
+@pytest.mark.parametrize(("kind", "probable"), [(2, True), (9, False)])
+def test_an_uncertain_object_counts_as_what_is_more_probable(kind: int, probable: bool, painted: PaintedObject) -> None:
+    burst = seen(painted, kind, 9)
+    asked = (decide(SIX_KINDS, burst, DecisionConfig(false_known_rate=rate)) for rate in np.geomspace(1e-9, 0.5, 60))
+    unsure = next(decision for decision in asked if decision.outcome == "uncertain")
+    assert (unsure.probability > 0.5) == probable
+    assert (unsure.rival == unsure.similarity) == (not probable)
 
 
 def test_the_rival_of_a_known_object_is_of_another_category(painted: PaintedObject) -> None:
