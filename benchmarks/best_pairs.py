@@ -5,7 +5,7 @@ Letters: T memories side by side, C categories (room for them), H bursts held, S
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -37,6 +37,12 @@ class BestPairs:
         level = cohort_level(others, self.prior.cohort)
         evidence = match - (level[:, None] + level[None, :]) / 2
         return evidence if self.agreement is None else evidence + self.prior.agreement_weight * self.agreements()
+
+    def without(self, burst: int) -> BestPairs:
+        """The same without a burst."""
+        kept = np.delete(np.arange(self.match.shape[1]), burst)
+        agreement = None if self.agreement is None else self.agreement[np.ix_(kept, kept)]
+        return replace(self, match=self.match[:, kept][:, :, kept], agreement=agreement)
 
     def agreements(self) -> FloatArray:
         """Agreement of reference i with burst j, shape (N, N): 1 with itself, 0 where it has no pose."""

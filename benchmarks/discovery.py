@@ -24,7 +24,7 @@ from benchmarks.discovery_plot import plot
 from benchmarks.encoded import encode_all, read_views
 from benchmarks.episodes import Counts, SetSource, draw_orders, episode
 from benchmarks.matches import matches
-from benchmarks.pair_scores import PARTS, FloatArray, PairScores, auroc
+from benchmarks.pair_scores import PARTS, FloatArray, PairScores, auroc, hardest, nearest_accuracy, same_and_other
 from benchmarks.parallel import map_jobs
 from benchmarks.tables import Row, print_table, write_json
 from clients.datasets.sources import find_sequences
@@ -36,7 +36,7 @@ from core.novelty import BEST, SCORES, require_score
 
 LEVELS = np.concatenate([np.linspace(0, 0.9, 7), 1 - np.geomspace(0.1, 0.001, 20), [1.0]])
 """Quantiles of the similarities between bursts at which a curve has a threshold: dense at the top, where the errors trade."""
-BEYOND = 12
+BEYOND = 24
 """Thresholds between the most similar pair of bursts and a burst to itself: evidence in a small memory is larger than between many."""
 SUMS = 30
 """Further thresholds of a sum, which grows with the members of a category."""
@@ -50,6 +50,8 @@ BAND = (0.05, 0.95)
 """Of the episodes, which share of them the band around a curve holds."""
 TOKENS = "best, tokens alone"
 """`best` as it is without depth."""
+EASIER = "best, one object less"
+"""`best` without the object that is hardest to tell from another kind: how much of the error is that one's."""
 SUMMARY = ("score", "auroc", "nearest", "fn_at_zero_fp", "fn_at_one_fp", "default_threshold", "default_fp", "default_fn", "repeat_error")
 RATE_COLUMNS = (
     "score",
@@ -113,8 +115,12 @@ def run(
     orders = draw_orders(episodes, labels, length, seed)
     started = time.perf_counter()
     rows = [row for name, table in tables.items() for row in score_rows(name, table, labels, orders)]
-    first = tables.get(BEST)
-    rates = rate_rows(BEST, first, labels, orders) if isinstance(first, BestPairs) else []
+    first, rates, left_out = tables.get(BEST), list[Row](), None
+    if isinstance(first, BestPairs):
+        left_out = hardest(first.single(), labels)
+        fewer = np.delete(labels, left_out)
+        rows += score_rows(EASIER, first.without(left_out), fewer, draw_orders(episodes, fewer, length, seed))
+        rates = rate_rows(BEST, first, labels, orders)
     meta = {
         "benchmark": "discovery",
         "data": data,
@@ -125,6 +131,7 @@ def run(
         "categories": len(names),
         "backbone": network.name,
         "fingerprint": network.fingerprint,
+        "hardest": None if left_out is None else sequences[left_out].name,
         "episode_seconds": time.perf_counter() - started,
     }
     if json is not None:
@@ -250,18 +257,3 @@ def threshold_grid(name: str, pairs: PairScores | BestPairs, single: FloatArray,
     if name == "paper_sum" and isinstance(pairs, PairScores):
         grid.append(np.geomspace(top, pairs.total.sum(axis=0).max() * SUM_REACH + TINY, SUMS))
     return np.unique(np.concatenate(grid))
-
-
-def same_and_other(single: FloatArray, labels: NDArray[np.intp]) -> tuple[FloatArray, FloatArray]:
-    """Similarities of pairs of different bursts: of the same category, and of two categories."""
-    same = labels[:, None] == labels[None, :]
-    different_bursts = ~np.eye(len(labels), dtype=bool)
-    return single[same & different_bursts], single[~same]
-
-
-def nearest_accuracy(single: FloatArray, labels: NDArray[np.intp]) -> float:
-    """Share of bursts whose most similar other burst is of their category, of those that have one."""
-    others = np.where(np.eye(len(labels), dtype=bool), -np.inf, single)
-    has_other = np.bincount(labels)[labels] > 1
-    right = labels[others.argmax(axis=0)] == labels
-    return float(right[has_other].mean())

@@ -84,3 +84,27 @@ def auroc(positive: FloatArray, negative: FloatArray) -> float:
         return float("nan")
     ranks = rankdata(np.concatenate([positive, negative]))[: len(positive)]
     return float((ranks.sum() - len(positive) * (len(positive) + 1) / 2) / (len(positive) * len(negative)))
+
+
+def same_and_other(single: FloatArray, labels: NDArray[np.intp]) -> tuple[FloatArray, FloatArray]:
+    """Similarities of pairs of different bursts: of the same category, and of two categories."""
+    same = labels[:, None] == labels[None, :]
+    different_bursts = ~np.eye(len(labels), dtype=bool)
+    return single[same & different_bursts], single[~same]
+
+
+def nearest_accuracy(single: FloatArray, labels: NDArray[np.intp]) -> float:
+    """Share of bursts whose most similar other burst is of their category, of those that have one."""
+    others = np.where(np.eye(len(labels), dtype=bool), -np.inf, single)
+    has_other = np.bincount(labels)[labels] > 1
+    right = labels[others.argmax(axis=0)] == labels
+    return float(right[has_other].mean())
+
+
+def hardest(single: FloatArray, labels: NDArray[np.intp]) -> int:
+    """The burst whose most similar burst of its kind leads least over the most similar one of another, both ways taken together."""
+    both = (single + single.T) / 2
+    same = labels[:, None] == labels[None, :]
+    own = np.where(same & ~np.eye(len(labels), dtype=bool), both, -np.inf).max(axis=0)
+    lead = own - np.where(same, -np.inf, both).max(axis=0)
+    return int(np.where(np.isfinite(lead), lead, np.inf).argmin())

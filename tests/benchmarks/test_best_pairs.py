@@ -56,6 +56,13 @@ def test_evidence_is_the_service_s(pairs: BestPairs, patches: list[torch.Tensor]
     np.testing.assert_allclose(evidence[0], [value for _, value in expected], atol=1e-5)
 
 
+def test_a_burst_can_be_left_out(pairs: BestPairs) -> None:
+    fewer = pairs.without(4)
+    kept = [index for index in range(len(LABELS)) if index != 4]
+    assert np.array_equal(fewer.match, pairs.match[:, kept][:, :, kept])
+    assert np.array_equal(fewer.agreement, pairs.agreement[kept][:, kept], equal_nan=True)
+
+
 def test_poses_count_for_the_three_with_the_most_evidence_by_their_founders(pairs: BestPairs) -> None:
     alone, verified = BestSource(BestPairs(pairs.match, None, PRIOR), 10), BestSource(pairs, 10)
     used = filled(alone)
@@ -75,6 +82,8 @@ def test_calibrated_episodes_know_kinds_apart_and_count_what_they_met(pairs: Bes
     assert (answers.unknown + answers.holding).tolist() == [[17, 17]]
     assert (answers.false_known <= answers.unknown).all()
     assert (answers.missed + answers.mistaken + answers.holding_uncertain <= answers.holding).all()
+    assert (answers.new <= answers.unknown).all()
+    assert (answers.new_false_known <= np.minimum(answers.new, answers.false_known)).all()
     assert answers.missed[0, 1] <= answers.missed[0, 0] < answers.holding[0, 0]
     twice = answers + answers
     assert twice.unknown.shape == (2, 2)

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from benchmarks.pair_scores import PairScores, auroc
+from benchmarks.pair_scores import PairScores, auroc, hardest
 from core.errors import InvalidInput
 from core.novelty import SCORES, DecisionConfig, Member, decide
 
@@ -47,3 +47,17 @@ def test_an_unknown_score_is_refused(bursts: list[SimpleNamespace]) -> None:
 )
 def test_auroc(positive: list[float], negative: list[float], expected: float) -> None:
     assert auroc(np.array(positive), np.array(negative)) == expected
+
+
+def test_the_hardest_burst_is_the_one_that_leads_least() -> None:
+    labels = np.array([0, 0, 1, 1, 2])
+    single = np.array(
+        [
+            [9.0, 0.8, 0.1, 0.2, 0.7],
+            [0.8, 9.0, 0.6, 0.1, 0.1],
+            [0.1, 0.6, 9.0, 0.4, 0.1],
+            [0.2, 0.1, 0.4, 9.0, 0.1],
+            [0.7, 0.1, 0.1, 0.1, 9.0],  # alone of its kind: nothing can lead
+        ]
+    )
+    assert hardest(single, labels) == 2
