@@ -2,7 +2,7 @@
 SHELL := /bin/bash
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help setup weights demo test lint types unit browser serve bench soak clean
+.PHONY: help setup weights demo test lint types unit browser serve bench soak fuzz clean
 
 # The python to build the environment with: the newest of 3.10 and later on the PATH.
 PYTHON ?= $(shell for name in python3.13 python3.12 python3.11 python3.10 python3 python; do \
@@ -12,6 +12,8 @@ TORCH_INDEX ?=
 # What `make bench` runs on.
 DATA ?= tests/data/bursts
 OUT ?= out
+# How long `make fuzz` goes on.
+FUZZ_SECONDS ?= 600
 
 # Debian's packages with the libraries that Open3D links to.
 LIBRARIES := libusb-1.0-0 libgl1 libegl1 libx11-6 libudev1 libidn2-0
@@ -27,7 +29,7 @@ READY := $(VENV)/.ready
 help: ## list the targets
 	@echo "OneLook. make TARGET, where TARGET is one of"
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  %-9s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
-	@echo "Variables: TORCH_INDEX=https://download.pytorch.org/whl/cpu (torch without CUDA), PYTHON=python3.12, DATA=folder, OUT=folder"
+	@echo "Variables: TORCH_INDEX=https://download.pytorch.org/whl/cpu (torch without CUDA), PYTHON=python3.12, DATA=folder, OUT=folder, FUZZ_SECONDS=600"
 
 setup: $(READY) ## make the virtual environment .venv and install everything in it
 
@@ -62,6 +64,9 @@ browser:
 
 unit: setup browser
 	@$(BIN)/pytest
+
+fuzz: setup ## feed everything that reads uploads what breaks it, ten minutes long; what it finds is kept in OUT
+	@$(BIN)/python -m tests.fuzz --seconds $(FUZZ_SECONDS) --found $(OUT)/fuzz
 
 serve: setup ## the service on 127.0.0.1:8000
 	@$(BIN)/onelook serve

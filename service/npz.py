@@ -32,6 +32,8 @@ EXPECTED = {
     "K": "(3, 3) or (V, 3, 3)",
     "world_from_camera": "(V, 4, 4)",
 }
+COMPRESSIONS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
+"""Those that NumPy writes; others unpack to thousands of times their size, and fail in ways of their own."""
 LARGEST_MATRIX = 4
 """Rows and columns of a camera's matrices."""
 
@@ -56,7 +58,7 @@ def decode_npz(body: bytes, limits: BurstLimits) -> Upload:
 def _arrays(body: bytes, limits: BurstLimits) -> dict[str, NDArray[Any]]:
     try:
         with zipfile.ZipFile(io.BytesIO(body)) as archive:
-            entries = archive.namelist()
+            entries = archive.infolist()
             if len(entries) > len(DIMENSIONS):
                 raise InvalidInput("body", f"has {len(entries)} arrays; it may have {', '.join(DIMENSIONS)}, each once")
             shapes = {name: _shape(archive, name) for name in map(_array_name, entries)}
@@ -66,10 +68,12 @@ def _arrays(body: bytes, limits: BurstLimits) -> dict[str, NDArray[Any]]:
         raise InvalidInput("body", f"is not a readable npz file ({error}); write it with numpy.savez") from None
 
 
-def _array_name(entry: str) -> str:
-    name = entry.removesuffix(".npy")
-    if name not in DIMENSIONS or name == entry:
+def _array_name(entry: zipfile.ZipInfo) -> str:
+    name = entry.filename.removesuffix(".npy")
+    if name not in DIMENSIONS or name == entry.filename:
         raise InvalidInput(name, f"is not expected in the npz; it may have {', '.join(DIMENSIONS)}")
+    if entry.compress_type not in COMPRESSIONS:
+        raise InvalidInput(name, "is compressed in a way that NumPy does not; write the npz with numpy.savez or numpy.savez_compressed")
     return name
 
 
