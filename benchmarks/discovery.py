@@ -34,9 +34,11 @@ from core.encode import Encoder
 from core.errors import InvalidInput
 from core.novelty import BEST, SCORES, require_score
 
-LEVELS = np.concatenate([np.linspace(0, 0.9, 7), 1 - np.geomspace(0.1, 0.001, 20), [1.0]])
-"""Quantiles of the similarities between bursts at which a curve has a threshold: dense at the top, where the errors trade."""
-BEYOND = 24
+LEVELS = np.concatenate([np.linspace(0, 0.9, 7), 1 - np.geomspace(0.1, 0.001, 10)])
+"""Quantiles of the similarities between bursts at which a curve has a threshold."""
+TRADE, TRADE_ABOVE = 40, 0.9
+"""Thresholds between this quantile and the most similar pair, evenly spaced: here the errors trade."""
+BEYOND = 8
 """Thresholds between the most similar pair of bursts and a burst to itself: evidence in a small memory is larger than between many."""
 SUMS = 30
 """Further thresholds of a sum, which grows with the members of a category."""
@@ -253,7 +255,9 @@ def threshold_grid(name: str, pairs: PairScores | BestPairs, single: FloatArray,
     """Ascending thresholds, shape (T,): where similarities lie, the score's own, and one that nothing exceeds."""
     top = float(single.max())  # of a burst to itself
     between = single[~np.eye(len(single), dtype=bool)]
-    grid = [np.quantile(between, LEVELS), np.linspace(float(between.max()), top, BEYOND), [own, top + TINY]]
+    largest = float(between.max())
+    trade = np.linspace(float(np.quantile(between, TRADE_ABOVE)), largest, TRADE)
+    grid = [np.quantile(between, LEVELS), trade, np.linspace(largest, top, BEYOND), [own, top + TINY]]
     if name == "paper_sum" and isinstance(pairs, PairScores):
         grid.append(np.geomspace(top, pairs.total.sum(axis=0).max() * SUM_REACH + TINY, SUMS))
     return np.unique(np.concatenate(grid))
