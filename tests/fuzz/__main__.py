@@ -26,21 +26,23 @@ def fuzz(name: str, seconds: int, found: Path) -> bool:
         command = [sys.executable, "-W", "ignore", "-m", "tests.fuzz.one", name, folder, f"-artifact_prefix={found}/{name}-"]
         command += [f"-max_total_time={seconds}", f"-timeout={ONE_INPUT_S}", f"-rss_limit_mb={MEMORY_MB}", f"-max_len={LARGEST}"]
         with (found / f"{name}.log").open("w+") as log, subprocess.Popen(command, stdout=log, stderr=subprocess.STDOUT) as process:
-            start = time.monotonic()
+            started: float | None = None
             while process.poll() is None:
                 time.sleep(PROGRESS_S if seconds > PROGRESS_S else 1)
                 tried, coverage = progress(Path(log.name).read_text(errors="replace"))
-                passed = time.monotonic() - start
+                if started is None and tried:  # before, it takes everything apart to see what is reached
+                    started = time.monotonic()
+                passed = 0.0 if started is None else time.monotonic() - started
                 sys.stderr.write(f"\r{name:10} {passed:5.0f} of {seconds} s, {tried:>9} inputs, coverage {coverage:>6} ")
                 sys.stderr.flush()
     sys.stderr.write("ok\n" if process.returncode == 0 else f"FOUND, see {found / name}.log\n")
     return process.returncode == 0
 
 
-def progress(log: str) -> tuple[str, str]:
+def progress(log: str) -> tuple[int, int]:
     """Inputs tried, and places reached."""
     told = re.findall(r"^#(\d+)\s.*?cov: (\d+)", log, re.MULTILINE)
-    return told[-1] if told else ("0", "0")
+    return (int(told[-1][0]), int(told[-1][1])) if told else (0, 0)
 
 
 def main() -> int:

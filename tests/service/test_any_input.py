@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import base64
 import io
 import json
 
+import cv2
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -40,6 +42,10 @@ def sent(client, parts, burst, content):
     files = parts(burst)
     files[0] = ("burst", ("burst.json", content, "application/json"))
     return client.post("/v1/observations", files=files)
+
+
+def as_text(image):
+    return base64.b64encode(cv2.imencode(".png", image)[1].tobytes()).decode()
 
 
 @few
@@ -101,3 +107,39 @@ def test_an_empty_zip_is_no_burst(client):
     empty = io.BytesIO()
     np.savez(empty)
     require_answered(client.post("/v1/observations", content=empty.getvalue(), headers={"content-type": "application/x-npz"}))
+
+
+@few
+@given(
+    message=JSON | st.dictionaries(st.sampled_from(["type", "category_id", "window", "variant", "weight", "seed"]), JSON | st.just("hello"))
+)
+def test_any_first_message_of_a_followed_object(client, message):
+    with client.websocket_connect("/v1/track") as followed:
+        followed.send_text(json.dumps(message))
+        assert followed.receive_json()["type"] in {"problem", "ready"}
+
+
+@few
+@given(
+    changes=st.dictionaries(
+        st.sampled_from(["id", "K", "world_from_camera", "depth_scale", "time_s", "rgb", "depth", "mask"]), JSON | NUMBERS, min_size=1
+    )
+)
+def test_any_frame_of_a_followed_object(client, burst, changes):
+    view = burst.views[0]
+    frame = {
+        "type": "frame",
+        "id": 1,
+        "K": view.camera.K.tolist(),
+        "world_from_camera": view.camera.world_from_camera.tolist(),
+        "rgb": as_text(view.rgb[..., ::-1]),
+        "depth": as_text(np.round(view.depth_m * 1000).astype(np.uint16)),
+    }
+    with client.websocket_connect("/v1/track") as followed:
+        followed.send_text('{"type": "hello"}')
+        assert followed.receive_json()["type"] == "ready"
+        followed.send_text(json.dumps(frame | changes))
+        assert followed.receive_json()["type"] in {"problem", "pose"}
+        followed.send_text(json.dumps(frame | {"id": 2, "time_s": 1e308}))
+        answer = followed.receive_json()
+        assert (answer["type"], answer["frame_id"]) in {("pose", 2), ("problem", 2)}

@@ -120,6 +120,18 @@ def test_the_trial_of_a_disk_leaves_nothing(disk, filled, changes):
     assert disk.calls == 0, "a sound memory is not written to"
 
 
+def test_a_start_on_a_full_disk_is_one_sentence_and_leaves_the_memory_whole(disk, filled):
+    before = state(filled)
+    filled.close()
+    disk.fault = failing(errno.ENOSPC, "begin", "write", "mkdir")
+    with pytest.raises(Unavailable, match="full; free space"):
+        Memory.open(filled.folder)
+    disk.fault = lambda kind, path: None
+    with Memory.open(filled.folder) as again:
+        assert state(again) == before
+        assert again.check().ok
+
+
 def test_a_slow_disk_makes_writers_wait_and_nobody_else(disk, filled, changes):
     slow, reached = threading.Event(), threading.Event()
 
