@@ -46,7 +46,7 @@ def entries(archive: zipfile.ZipFile, limit: int) -> dict[str, zipfile.ZipInfo]:
     for info in found:
         kind = stat.S_IFMT(info.external_attr >> 16)
         if not info.filename or info.is_dir() or kind not in (0, stat.S_IFREG):
-            raise InvalidInput(FIELD, f"{info.filename!r} is no plain file with a name, as all in an archive of categories are")
+            raise InvalidInput(FIELD, f"{info.filename!r} is a folder, a link, a device or nameless; it may have plain files only")
         if info.compress_type != zipfile.ZIP_STORED or info.flag_bits & 1 or info.compress_size != info.file_size:
             raise InvalidInput(
                 FIELD, f"{info.filename!r} is compressed or encrypted; an archive of categories stores its files as they are"
