@@ -141,19 +141,20 @@ def npz_of(entries, compression=zipfile.ZIP_DEFLATED):
     with zipfile.ZipFile(buffer, "w", compression) as archive:
         for name, array in entries:
             stream = io.BytesIO()
-            np.lib.format.write_array(stream, array)
-            archive.writestr(name, stream.getvalue())
+            np.lib.format.write_array_header_1_0(stream, np.lib.format.header_data_from_array_1_0(array))
+            content = array.tobytes() if array.strides[0] else bytes(1000)  # what only says that it is large
+            archive.writestr(name, stream.getvalue() + content)
     return buffer.getvalue()
 
 
 def test_zip_bombs_are_refused_by_what_they_say(client, settings):
-    black = np.zeros((12, 3000, 4000, 3), np.uint8)
+    black = np.broadcast_to(np.uint8(0), (12, 3000, 4000, 3))
     refused(client.post("/v1/observations", content=npz_of([("rgb.npy", black)]), headers=NPZ), 422, "rgb", "ONELOOK_MAX_MEGAPIXELS")
-    small, wide = np.zeros((1, 64, 64, 3), np.uint8), np.zeros((1, 64, 200_000), np.float64)
+    small, wide = np.zeros((1, 64, 64, 3), np.uint8), np.broadcast_to(0.0, (1, 64, 200_000))
     for name in ("depth_m", "mask"):
         body = npz_of([("rgb.npy", small), (f"{name}.npy", wide)])
         refused(client.post("/v1/observations", content=body, headers=NPZ), 422, name, "fits no 64×64 images")
-    body = npz_of([("rgb.npy", small), ("K.npy", np.zeros((1, 3, 10_000_000)))])
+    body = npz_of([("rgb.npy", small), ("K.npy", np.broadcast_to(0.0, (1, 3, 10_000_000)))])
     refused(client.post("/v1/observations", content=body, headers=NPZ), 422, "K", "(3, 3) or (V, 3, 3)")
 
 
@@ -320,9 +321,10 @@ def test_hostile_json_bodies(client, learn, body):
         assert answer.json()["type"] == "urn:onelook:problem:invalid-input"
 
 
-@pytest.mark.parametrize(
-    "name", ["Ø杯🏆", "‮gnp.exe", "a\u0000b", "z\u0335\u0321" * 60, "'; DROP TABLE categories; --", "../../etc/passwd", " \t "]
-)
+NAMES = ["Ø杯🏆", "\u202egnp.exe", "a\0b", "z\u0335\u0321" * 60, "'; DROP TABLE categories; --", "../../etc/passwd", " \t "]
+
+
+@pytest.mark.parametrize("name", NAMES, ids=range(len(NAMES)))
 def test_names_are_text_and_nothing_else(client, learn, name):
     category = learn()
     renamed = client.patch(f"/v1/categories/{category['id']}", json={"name": name})
