@@ -145,9 +145,9 @@ def run(
 
 
 def plan(recordings: Recordings, limit: int | None, degradations: Sequence[Degradation]) -> list[Job]:
-    """For each target a job for all that leaves the picture as it is, and one for each other degradation; one target a category first.
+    """For each target a job for all that leaves the picture as it is, and one for each other degradation.
 
-    A smaller limit takes a prefix of a larger one's.
+    One target of each category comes first, one degradation after the other: a smaller limit takes a prefix of a larger one's.
     """
     geometric = tuple(each.name for each in degradations if not each.repaints)
     groups = [(CLEAN, *geometric), *((each.name,) for each in degradations if each.repaints)]
@@ -161,7 +161,8 @@ def plan(recordings: Recordings, limit: int | None, degradations: Sequence[Degra
     if not ranked:
         raise InvalidInput("data", "no category has two instances, so there is no pair to estimate")
     _require(recordings, [index for _, target, others in ranked for index in (target, *others)])
-    return [Job(recordings, target, others, group) for _, target, others in sorted(ranked) for group in groups]
+    jobs = [(rank, Job(recordings, target, others, group)) for group in groups for rank, target, others in ranked]
+    return [job for _, job in sorted(jobs, key=lambda entry: entry[0])]
 
 
 def work(job: Job) -> list[Outcome]:
