@@ -101,6 +101,7 @@ def run(
     views: str = "8",
     limit: int | None = None,
     degradations: Sequence[str] = (),
+    categories: Sequence[str] = (),
     seed: int = 0,
     backbone: str = "dinov2-s14",
     poses: bool = True,
@@ -110,6 +111,7 @@ def run(
     Args:
         picture: folder for the curves.
         degradations: names of those that are tried; all where there are none.
+        categories: of the targets, likewise; what the memory holds is of all.
         poses: whether poses verify decisions, as in the service.
 
     Raises InvalidInput for an unknown degradation, or data without two objects of a kind, ground truth, depth or enough views.
@@ -122,7 +124,9 @@ def run(
     network = load_backbone(backbone)
     sequences = tuple(find_sequences(data))
     recordings = Recordings(sequences, tuple(encode_all(sequences, Encoder(network))), ViewCounts.parse(views), seed, backbone, poses)
-    jobs = plan(recordings, limit, listed)
+    jobs = [job for job in plan(recordings, limit, listed) if not categories or sequences[job.target].category in categories]
+    if not jobs:
+        raise InvalidInput("category", f"no two objects below {data} are of {', '.join(categories)}")
     outcomes = [outcome for outcomes in map_jobs(work, jobs, lambda job: len(job.degradations), "degrading") for outcome in outcomes]
     rows = table_rows(listed, outcomes)
     if json is not None:
@@ -132,6 +136,7 @@ def run(
             "seed": seed,
             "views": views,
             "limit": limit,
+            "categories": list(categories),
             "poses": poses,
             "backbone": network.name,
             "fingerprint": network.fingerprint,

@@ -112,6 +112,12 @@ def test_a_smaller_limit_takes_a_prefix(two_kinds: Path) -> None:
     assert sorted(targets(None)) == ["egg/large", "egg/small", "plate/a", "plate/b"]
 
 
+def test_targets_may_be_of_some_categories(two_kinds: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    names = only(monkeypatch, jpeg=(50,))
+    clean, *_ = run(two_kinds, None, None, views="3", degradations=names, categories=["plate"], poses=False)
+    assert (clean["bursts"], clean["pairs"]) == (2, 2)
+
+
 def test_figures_of_known_outcomes() -> None:
     right, wrong = PoseError(10, 0, 0), PoseError(100, 0, 0)
     found = figures([Outcome("x", 1, (right, wrong), KNOWN), Outcome("x", 1, (right, right), MISSED)])
@@ -141,5 +147,7 @@ def test_rows_say_where_each_degradation_breaks() -> None:
 def test_what_does_not_exist_is_refused(recorded: Path) -> None:
     with pytest.raises(InvalidInput, match="fog"):
         run(recorded, None, None, degradations=["fog"])
+    with pytest.raises(InvalidInput, match="cat"):
+        run(recorded, None, None, views="3", degradations=["jpeg"], categories=["cat"])
     with pytest.raises(InvalidInput, match="views"):
         run(recorded, None, None, views="9", degradations=["jpeg"])
