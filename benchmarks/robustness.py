@@ -8,7 +8,7 @@ where it stopped. Silhouettes only place occluders and clutter; the product find
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from zlib import crc32
@@ -40,7 +40,7 @@ REFERENCES = 3
 """Other objects of its kind that a degraded one is posed against, at most."""
 FALL = 10.0
 """Points that a figure may lose before it counts as broken."""
-FIGURES = ("acc30", "auroc")
+FIGURES = ("acc30", "acc15", "auroc")
 """Those that may break: of poses and of decisions."""
 COLUMNS = ("degradation", "strength", "acc30", "acc15", "median_deg", "auroc", "nearest", "right", "uncertain", "false_known")
 BREAKS = ("degradation", "unit", *(f"{figure}_breaks_at" for figure in FIGURES))
@@ -75,12 +75,13 @@ class Recordings:
 
 @dataclass(frozen=True)
 class Job:
-    """One target under some degradations, all strengths of each."""
+    """One target under some degradations."""
 
     recordings: Recordings
     target: int
     references: tuple[int, ...]
-    degradations: tuple[str, ...]
+    strengths: dict[str, tuple[float, ...]]
+    """Of each degradation."""
 
 
 @dataclass(frozen=True)
@@ -102,6 +103,7 @@ def run(
     limit: int | None = None,
     degradations: Sequence[str] = (),
     categories: Sequence[str] = (),
+    strongest: int | None = None,
     seed: int = 0,
     backbone: str = "dinov2-s14",
     poses: bool = True,
@@ -112,6 +114,7 @@ def run(
         picture: folder for the curves.
         degradations: names of those that are tried; all where there are none.
         categories: of the targets, likewise; what the memory holds is of all.
+        strongest: so many strengths of each degradation are tried, the last ones; all where None.
         poses: whether poses verify decisions, as in the service.
 
     Raises InvalidInput for an unknown degradation, or data without two objects of a kind, ground truth, depth or enough views.
@@ -121,13 +124,15 @@ def run(
     if unknown:
         known = ", ".join(each.name for each in catalogue([]))
         raise InvalidInput("degradation", f"{', '.join(sorted(unknown))} is none of {known}")
+    if strongest is not None:
+        listed = [replace(each, strengths=each.strengths[-strongest:]) for each in listed]
     network = load_backbone(backbone)
     sequences = tuple(find_sequences(data))
     recordings = Recordings(sequences, tuple(encode_all(sequences, Encoder(network))), ViewCounts.parse(views), seed, backbone, poses)
     jobs = [job for job in plan(recordings, limit, listed) if not categories or sequences[job.target].category in categories]
     if not jobs:
         raise InvalidInput("category", f"no two objects below {data} are of {', '.join(categories)}")
-    outcomes = [outcome for outcomes in map_jobs(work, jobs, lambda job: len(job.degradations), "degrading") for outcome in outcomes]
+    outcomes = [outcome for outcomes in map_jobs(work, jobs, lambda job: len(job.strengths), "degrading") for outcome in outcomes]
     rows = table_rows(listed, outcomes)
     if json is not None:
         meta = {
@@ -137,6 +142,7 @@ def run(
             "views": views,
             "limit": limit,
             "categories": list(categories),
+            "strongest": strongest,
             "poses": poses,
             "backbone": network.name,
             "fingerprint": network.fingerprint,
@@ -154,8 +160,9 @@ def plan(recordings: Recordings, limit: int | None, degradations: Sequence[Degra
 
     One target of each category comes first, one degradation after the other: a smaller limit takes a prefix of a larger one's.
     """
-    geometric = tuple(each.name for each in degradations if not each.repaints)
-    groups = [(CLEAN, *geometric), *((each.name,) for each in degradations if each.repaints)]
+    geometric = {each.name: each.strengths for each in degradations if not each.repaints}
+    groups: list[dict[str, tuple[float, ...]]] = [{CLEAN: (0.0,), **geometric}]
+    groups += [{each.name: each.strengths} for each in degradations if each.repaints]
     ranked: list[tuple[int, int, tuple[int, ...]]] = []
     for category in sorted({sequence.category for sequence in recordings.sequences}):
         members = [index for index, sequence in enumerate(recordings.sequences) if sequence.category == category]
@@ -176,11 +183,11 @@ def work(job: Job) -> list[Outcome]:
     encoder = Encoder(Remembering(backbone_named(recordings.backbone)))
     name = recordings.sequences[job.target].name
     views = _masked(recordings, job.target, recordings.chosen(job.target, "target"))
-    things = [_masked(recordings, other, [0])[0] for other in recordings.things(job.target)] if CLUTTER in job.degradations else []
-    worse: list[tuple[str, float, list[View]]] = [(CLEAN, 0.0, views)] if CLEAN in job.degradations else []
+    things = [_masked(recordings, other, [0])[0] for other in recordings.things(job.target)] if CLUTTER in job.strengths else []
+    worse: list[tuple[str, float, list[View]]] = [(CLEAN, 0.0, views)] if CLEAN in job.strengths else []
     for each in catalogue(things):
-        if each.name in job.degradations:
-            worse += [(each.name, strength, each.degrade(views, strength, name, recordings.seed)) for strength in each.strengths]
+        tried = job.strengths.get(each.name, ())
+        worse += [(each.name, strength, each.degrade(views, strength, name, recordings.seed)) for strength in tried]
     return [Outcome(kind, strength, *judge(job, degraded, encoder)) for kind, strength, degraded in worse]
 
 

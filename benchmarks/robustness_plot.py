@@ -15,6 +15,7 @@ FILE = "robustness.png"
 COLUMNS = 4
 LINES = {
     "acc30": ("pose within 30°, %", "o-", "pairs"),
+    "acc15": ("within 15°, %", "o--", "pairs"),
     "auroc": ("own kind known from not, AUROC × 100", "s-", None),
     "nearest": ("most similar kind is the right one, %", "^:", "bursts"),
 }
@@ -50,5 +51,7 @@ def _draw(axes: Any, curve: Sequence[Row]) -> None:
         (line,) = axes.plot(values, style, markersize=4, label=label)
         if of is not None:
             error = np.sqrt(values * (100 - values) / np.array([row[of] for row in curve], dtype=float))
-            axes.fill_between(range(len(curve)), values - error, values + error, color=line.get_color(), alpha=0.15, linewidth=0)
+            axes.fill_between(
+                range(len(curve)), values - error, (values + error).clip(max=100), color=line.get_color(), alpha=0.15, linewidth=0
+            )
     axes.grid(alpha=0.3)

@@ -202,6 +202,7 @@ def robustness(
     limit: Annotated[int | None, typer.Option(min=1, help="Degraded objects a category at most; all others are references.")] = None,
     degradation: Annotated[list[str] | None, typer.Option(help='Such as "motion blur"; may be repeated; all where left out.')] = None,
     category: Annotated[list[str] | None, typer.Option(help="Of the degraded objects; may be repeated; all where left out.")] = None,
+    strongest: Annotated[int | None, typer.Option(min=1, help="Only so many strengths of each, the strongest.")] = None,
     poses: Annotated[bool, typer.Option(help="Verify decisions by pose, as the service does.")] = True,
     plot: Annotated[Path | None, typer.Option(help="Folder for the curves.")] = None,
     seed: Seed = 0,
@@ -211,4 +212,4 @@ def robustness(
     """How much worse sensors and places may get; goes on where it was interrupted."""
     from benchmarks.robustness import run
 
-    run(data, json, plot, views, limit, degradation or [], category or [], seed, backbone, poses)
+    run(data, json, plot, views, limit, degradation or [], category or [], strongest, seed, backbone, poses)

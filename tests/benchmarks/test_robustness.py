@@ -112,10 +112,11 @@ def test_a_smaller_limit_takes_a_prefix(two_kinds: Path) -> None:
     assert sorted(targets(None)) == ["egg/large", "egg/small", "plate/a", "plate/b"]
 
 
-def test_targets_may_be_of_some_categories(two_kinds: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    names = only(monkeypatch, jpeg=(50,))
-    clean, *_ = run(two_kinds, None, None, views="3", degradations=names, categories=["plate"], poses=False)
-    assert (clean["bursts"], clean["pairs"]) == (2, 2)
+def test_targets_may_be_of_some_categories_and_strengths_the_last_ones(two_kinds: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    names = only(monkeypatch, jpeg=(50, 5))
+    rows = run(two_kinds, None, None, views="3", degradations=names, categories=["plate"], strongest=1, poses=False)
+    assert {(row["bursts"], row["pairs"]) for row in rows[:-1]} == {(2, 2)}
+    assert [row["strength"] for row in rows[:-1]] == [0, 5]
 
 
 def test_figures_of_known_outcomes() -> None:
