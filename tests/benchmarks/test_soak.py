@@ -13,7 +13,7 @@ import pytest
 from benchmarks import soak
 
 ROOT = Path(__file__).parents[2]
-MINUTES = 0.4
+MINUTES = 0.3
 MOST_GROWTH = 0.05
 
 
