@@ -35,7 +35,7 @@ def plot_load(file: Path, rows: Sequence[LoadRow], title: str) -> None:
     inside.set(ylabel="requests", ylim=(0, None))
     memory = inside.twinx()
     memory.plot(robots, [row.resident_mb for row in rows], "s-", color="tab:green", label="resident memory")
-    memory.set(ylabel="MB", ylim=(0, None))
+    memory.set(ylabel="MB", ylim=(0, 1.25 * max(row.resident_mb for row in rows)))
     for panel in (rate, times, inside):
         panel.set_xscale("log", base=2)
         panel.set_xticks(robots, [str(each) for each in robots])

@@ -128,7 +128,7 @@ def living(bursts: Sequence[Burst]) -> Errand:
             await robot.forget((await scan.complete("passing")).id)
         else:
             (latest,) = await robot.observations(limit=1)
-            await robot.picture(f"/v1/observations/{latest.id}/overlay.png")
+            await robot.picture(f"/v1/observations/{latest.id}/foreground.png")
             await robot.categories()
 
     return errand
