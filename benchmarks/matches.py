@@ -26,31 +26,32 @@ STAGES = (0, 8, 32)
 
 
 def matches(bursts: Sequence[EncodedBurst], whitening: Whitening | None, folder: Path | None = None) -> FloatArray:
-    """Match of bursts i and j, shape (S, N, N), symmetric; kept in the user's cache.
-
-    A stage's statistics come from as many bursts, drawn at random: in an episode they would be those that came first.
-    """
+    """Match of bursts i and j, shape (S, N, N), symmetric; kept in the user's cache."""
     patches = [whitened(sample_patches(burst), whitening) for burst in bursts]
     file = (folder or cache_folder() / "matches") / f"{_key(patches)}.npy"
     if not file.exists():
-        order = np.random.default_rng(0).permutation(len(patches))
-        adaptations = [
-            Adaptation.fit([patches[index] for index in order[:count]]) if count else Adaptation.none(patches[0].shape[-1])
-            for count in STAGES
-        ]
+        adaptations = [adapted(patches, count) for count in STAGES]
         with bar() as progress:
             task = progress.add_task("matching patches", total=len(adaptations) * len(patches))
-            table = np.stack([_table(patches, each, lambda: progress.advance(task)) for each in adaptations])
+            table = np.stack([match_table(patches, each, lambda: progress.advance(task)) for each in adaptations])
         write(file, lambda stream: np.save(stream, table))
     return np.asarray(np.load(file))
 
 
-def _table(patches: list[FloatArray], adaptation: Adaptation, advance: Callable[[], None]) -> FloatArray:
+def adapted(patches: Sequence[FloatArray], count: int) -> Adaptation:
+    """To as many of the bursts, drawn at random: in an episode they would be those that came first."""
+    order = np.random.default_rng(0).permutation(len(patches))[:count]
+    return Adaptation.fit([patches[index] for index in order]) if count else Adaptation.none(patches[0].shape[-1])
+
+
+def match_table(patches: Sequence[FloatArray], adaptation: Adaptation, advance: Callable[[], None] | None = None) -> FloatArray:
+    """Of the whitened patches of N bursts, shape (N, N); `advance` is called after each row."""
     unit = [adaptation.directions(each) for each in patches]
     table = np.zeros((len(unit), len(unit)))
     for row, each in enumerate(unit):
         table[row, row:] = table[row:, row] = match_views(each, unit[row:])
-        advance()
+        if advance:
+            advance()
     return table
 
 

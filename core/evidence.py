@@ -44,11 +44,11 @@ MOST_MEMBERS = 256
 """Of a larger memory the members most similar by pooled tokens are compared patch by patch."""
 
 
-def sample_patches(encoded: EncodedBurst) -> NDArray[np.float16]:
-    """Tokens of random foreground patches, shape (V, K, D), of the views that show an object; drawn again where there are fewer."""
+def sample_patches(encoded: EncodedBurst, patches: int = PATCHES) -> NDArray[np.float16]:
+    """Tokens of random foreground patches, shape (V, K = patches, D), of views that show an object; drawn again where there are fewer."""
     rng = np.random.default_rng(0)
     shown = [view.descriptors for view in encoded.views if len(view.descriptors)]
-    return np.stack([tokens[rng.permutation(len(tokens))[np.arange(PATCHES) % len(tokens)]] for tokens in shown]).astype(np.float16)
+    return np.stack([tokens[rng.permutation(len(tokens))[np.arange(patches) % len(tokens)]] for tokens in shown]).astype(np.float16)
 
 
 def whitened(patches: FloatArray, whitening: Whitening | None) -> FloatArray:
@@ -108,15 +108,15 @@ def match_views(target: Tensor, others: Sequence[Tensor]) -> FloatArray:
     return np.array(found)
 
 
-def cohort_level(matches: FloatArray, prior: float) -> FloatArray:
-    """Mean of the COHORT best of the matches with other categories, shape (*) from (*, C).
+def cohort_level(matches: FloatArray, prior: float, cohort: int = COHORT) -> FloatArray:
+    """Mean of the `cohort` best of the matches with other categories, shape (*) from (*, C).
 
-    −inf stands for no category; what is missing to COHORT counts as `prior`.
+    −inf stands for no category; what is missing to `cohort` counts as `prior`.
     """
     count = matches.shape[-1]
-    best = np.partition(matches, count - COHORT, axis=-1)[..., -COHORT:] if count > COHORT else matches
+    best = np.partition(matches, count - cohort, axis=-1)[..., -cohort:] if count > cohort else matches
     there = best > -np.inf
-    return np.asarray((np.where(there, best, prior).sum(axis=-1) + prior * max(COHORT - count, 0)) / COHORT)
+    return np.asarray((np.where(there, best, prior).sum(axis=-1) + prior * max(cohort - count, 0)) / cohort)
 
 
 class HasPooled(Protocol):

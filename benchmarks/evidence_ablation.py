@@ -1,0 +1,97 @@
+"""What the choices of `core.evidence` are worth, one varied at a time: `python -m benchmarks.evidence_ablation --data DIR --json FILE`.
+
+Between objects, as if each were a category of its own, by tokens alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+from numpy.typing import NDArray
+
+from benchmarks.encoded import encode_all, read_views
+from benchmarks.matches import STAGES, adapted, match_table
+from benchmarks.pair_scores import FloatArray, auroc, nearest_accuracy, same_and_other
+from benchmarks.parallel import map_jobs
+from benchmarks.tables import Row, print_table, write_json
+from clients.datasets.sources import find_sequences
+from core.backbones.dino import load_backbone
+from core.backbones.whitening import Whitening
+from core.calibration import Prior
+from core.encode import Encoder
+from core.evidence import COHORT, PATCHES, cohort_level, sample_patches, whitened
+
+COLUMNS = ("change", "auroc", "nearest")
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One setting of the evidence."""
+
+    patches: int = PATCHES
+    """Of a view."""
+    adapted: int = STAGES[-1]
+    """Objects, drawn at random, that the statistics adapt to."""
+    cohort: int = COHORT
+
+
+@dataclass(frozen=True)
+class Job:
+    """The table of matches that a choice needs."""
+
+    files: tuple[Path, ...]
+    whitening: Whitening | None
+    choice: Choice
+
+
+def main(
+    data: Annotated[str, typer.Option(help="Recorded objects, as of onelook bench discovery.")],
+    json: Annotated[Path | None, typer.Option(help="File for the table.")] = None,
+) -> None:
+    """Prints a table, today's choice first."""
+    backbone = load_backbone(report=typer.echo)
+    sequences = find_sequences(data)
+    files = tuple(encode_all(sequences, Encoder(backbone)))
+    labels = np.unique([sequence.category for sequence in sequences], return_inverse=True)[1]
+    choices = varied(len(files))
+    tables = dict.fromkeys(replace(choice, cohort=COHORT) for choice in choices.values())
+    matches = dict(
+        zip(tables, map_jobs(table, [Job(files, backbone.whitening, choice) for choice in tables], lambda job: 1, "matching patches"))
+    )
+    rows = [row(name, matches[replace(choice, cohort=COHORT)], choice.cohort, labels) for name, choice in choices.items()]
+    if json is not None:
+        write_json(json, {"benchmark": "evidence_ablation", "data": data, "sequences": len(files)}, rows)
+    print_table(f"Evidence, {data}", rows, COLUMNS)
+
+
+def varied(objects: int) -> dict[str, Choice]:
+    """Choices by their names."""
+    today = Choice()
+    return {
+        "today's": today,
+        **{f"patches of a view: {count}": replace(today, patches=count) for count in (12, 48, 96)},
+        **{f"statistics of objects: {count}": replace(today, adapted=count) for count in (0, 8, objects)},
+        **{f"cohort: {count}": replace(today, cohort=count) for count in (1, 3, 10)},
+    }
+
+
+def table(job: Job) -> FloatArray:
+    """Matches of all pairs, shape (N, N)."""
+    patches = [whitened(sample_patches(read_views(file), job.choice.patches), job.whitening) for file in job.files]
+    return match_table(patches, adapted(patches, job.choice.adapted))
+
+
+def row(name: str, matches: FloatArray, cohort: int, labels: NDArray[np.intp]) -> Row:
+    """One line of the table."""
+    others = np.where(np.eye(len(matches), dtype=bool), -np.inf, matches)
+    level = cohort_level(others, Prior.shipped().cohort, cohort)
+    single = matches - (level[:, None] + level[None, :]) / 2
+    return dict(zip(COLUMNS, (name, auroc(*same_and_other(single, labels)), nearest_accuracy(single, labels))))
+
+
+if __name__ == "__main__":
+    typer.run(main)

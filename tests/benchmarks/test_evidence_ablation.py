@@ -1,0 +1,36 @@
+"""The ablation of the evidence: its arithmetic on a known table."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from benchmarks.evidence_ablation import Choice, row, varied
+from benchmarks.matches import adapted, match_table
+from core.evidence import PATCHES, Adaptation
+
+
+def test_one_choice_is_varied_at_a_time() -> None:
+    choices = varied(40)
+    today = choices["today's"]
+    assert today == Choice(PATCHES)
+    for choice in list(choices.values())[1:]:
+        assert sum(getattr(choice, name) != getattr(today, name) for name in ("patches", "adapted", "cohort")) == 1
+
+
+@pytest.mark.parametrize("cohort", [1, 3])
+def test_a_hub_is_not_the_nearest_once_its_level_is_taken_off(cohort: int) -> None:
+    matches = np.array([[1.0, 0.58, 0.3, 0.6], [0.58, 1.0, 0.3, 0.6], [0.3, 0.3, 1.0, 0.6], [0.6, 0.6, 0.6, 1.0]])
+    found = row("it", matches, cohort, np.array([0, 0, 1, 2]))
+    assert found["change"] == "it"
+    assert (found["nearest"] == 1.0) == (cohort == 3)
+
+
+def test_tables_are_symmetric_and_adapted_to_what_is_asked() -> None:
+    rng = np.random.default_rng(0)
+    patches = [rng.normal(size=(2, 8, 6)).astype(np.float32) for _ in range(4)]
+    table = match_table(patches, adapted(patches, 3))
+    assert np.array_equal(table, table.T)
+    assert np.allclose(np.diag(table), 1, atol=1e-5)
+    assert not np.allclose(table, match_table(patches, adapted(patches, 0)), atol=1e-3)
+    assert np.array_equal(adapted(patches, 0).matrix, Adaptation.none(6).matrix)
