@@ -118,6 +118,7 @@ def test_a_merge_is_previewed_done_and_taken_back(tab, cup, tv, robot):
 def test_a_deletion_asks_first_and_is_taken_back_from_the_changes(tab, cup, robot):
     page = tab.open(f"/categories/{cup}")
     page.get_by_role("link", name="Delete").click()
+    page.wait_for_load_state("networkidle")  # else its pictures would be asked for when it is gone
     page.get_by_role("button", name="Delete").click()
     expect(page.get_by_text("1 category")).to_be_visible()
     page = tab.open("/memory")
