@@ -26,9 +26,8 @@ from core.backbones.weights import cache_folder
 from core.backbones.whitening import Whitening
 from core.encode import EncodedBurst
 from core.errors import OneLookError
-from core.pose import PoseConfig, PoseEstimator
 from core.reference import Reference, build_reference
-from core.verification import agreement
+from core.verification import verify
 
 FloatArray = NDArray[np.floating[Any]]
 VIEWS = 8
@@ -77,7 +76,6 @@ def agreements(files: Sequence[Path], whitening: Whitening | None, folder: Path 
 
 def compute_row(job: Job) -> None:
     """Solves every reference against the job's target and writes the agreements, shape (N,)."""
-    estimator = PoseEstimator(PoseConfig.named("best"))
     row = np.full(len(job.files), np.nan)
     target = few_views(read_encoded(job.files[job.target]))
     for i, file in enumerate(job.files):
@@ -85,7 +83,7 @@ def compute_row(job: Job) -> None:
         if i == job.target or reference is None or not len(target.cloud_m):
             continue
         try:
-            row[i] = agreement(reference, target, estimator.estimate(reference, target).target_from_reference, job.whitening)
+            _, row[i] = verify(reference, target, job.whitening)
         except OneLookError:  # no pose: nothing of the reference is found in the burst
             row[i] = 0.0
     write(job.row, lambda stream: np.save(stream, row))

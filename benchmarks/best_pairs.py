@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from benchmarks.matches import STAGES
 from core.calibration import Prior
-from core.evidence import SHORTLIST, cohort_level
+from core.evidence import COHORT, SHORTLIST, cohort_level
 from core.novelty import VERIFIED
 
 FloatArray = NDArray[np.floating[Any]]
@@ -32,10 +32,7 @@ class BestPairs:
 
     def single(self) -> FloatArray:
         """Evidence of every burst alone for every burst, shape (N, N), as if each were a category of its own."""
-        match = self.match[-1]
-        others = np.where(np.eye(len(match), dtype=bool), -np.inf, match)
-        level = cohort_level(others, self.prior.cohort)
-        evidence = match - (level[:, None] + level[None, :]) / 2
+        evidence = single_evidence(self.match[-1], self.prior)
         return evidence if self.agreement is None else evidence + self.prior.agreement_weight * self.agreements()
 
     def without(self, burst: int) -> BestPairs:
@@ -48,6 +45,13 @@ class BestPairs:
         """Agreement of reference i with burst j, shape (N, N): 1 with itself, 0 where it has no pose."""
         assert self.agreement is not None
         return np.where(np.eye(len(self.agreement), dtype=bool), 1.0, np.nan_to_num(self.agreement))
+
+
+def single_evidence(match: FloatArray, prior: Prior, cohort: int = COHORT) -> FloatArray:
+    """Evidence by tokens of every burst alone for every burst, from their matches, both (N, N)."""
+    others = np.where(np.eye(len(match), dtype=bool), -np.inf, match)
+    level = cohort_level(others, prior.cohort, cohort)
+    return np.asarray(match - (level[:, None] + level[None, :]) / 2)
 
 
 class BestSource:

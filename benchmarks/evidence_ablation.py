@@ -13,6 +13,7 @@ import numpy as np
 import typer
 from numpy.typing import NDArray
 
+from benchmarks.best_pairs import single_evidence
 from benchmarks.encoded import encode_all, read_views
 from benchmarks.matches import STAGES, adapted, match_table
 from benchmarks.pair_scores import FloatArray, auroc, nearest_accuracy, same_and_other
@@ -23,7 +24,7 @@ from core.backbones.dino import load_backbone
 from core.backbones.whitening import Whitening
 from core.calibration import Prior
 from core.encode import Encoder
-from core.evidence import COHORT, PATCHES, cohort_level, sample_patches, whitened
+from core.evidence import COHORT, PATCHES, sample_patches, whitened
 
 COLUMNS = ("change", "auroc", "nearest")
 
@@ -87,9 +88,7 @@ def table(job: Job) -> FloatArray:
 
 def row(name: str, matches: FloatArray, cohort: int, labels: NDArray[np.intp]) -> Row:
     """One line of the table."""
-    others = np.where(np.eye(len(matches), dtype=bool), -np.inf, matches)
-    level = cohort_level(others, Prior.shipped().cohort, cohort)
-    single = matches - (level[:, None] + level[None, :]) / 2
+    single = single_evidence(matches, Prior.shipped(), cohort)
     return dict(zip(COLUMNS, (name, auroc(*same_and_other(single, labels)), nearest_accuracy(single, labels))))
 
 

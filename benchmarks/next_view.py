@@ -30,10 +30,9 @@ from core.evidence import sample_patches
 from core.next_view import OFFERED, Candidate, next_viewpoints
 from core.novelty import Context, Decision, DecisionConfig, Member, decide
 from core.packing import burst_as_arrays, burst_from_arrays
-from core.pose import PoseConfig, PoseEstimator
 from core.reference import Reference, build_reference
 from core.scan import ScanOptions, angles_about_deg, request_scan
-from core.verification import agreement
+from core.verification import verify
 from core.views import Burst, FloatArray, View
 
 SCANNED = 10
@@ -209,16 +208,16 @@ class Memory:
         whitening = self._encoder.backbone.whitening
         self._laid: dict[str, Candidate] = {}
 
-        def verify(category: str) -> float:
+        def explain(category: str) -> float:
             reference = _reference(self._scans[category])
             try:
-                pose = PoseEstimator(PoseConfig.named("best")).estimate(reference, encoded).target_from_reference
+                estimate, found = verify(reference, encoded, whitening)
             except NoPose:
                 return 0.0
-            self._laid[category] = Candidate(reference, pose)
-            return agreement(reference, encoded, pose, whitening)
+            self._laid[category] = Candidate(reference, estimate.target_from_reference)
+            return found
 
-        return decide(self._members, encoded, self._config, Context(whitening, verify=verify))
+        return decide(self._members, encoded, self._config, Context(whitening, verify=explain))
 
     def viewpoints(self, encoded: EncodedBurst, decision: Decision) -> FloatArray:
         """Those offered with the decision just made, shape (n, 4, 4)."""

@@ -28,7 +28,7 @@ from core.evidence import sample_patches
 from core.novelty import BEST, DEFAULT_SCORE, SCORE_NAMES, VERIFIED, Context, DecisionConfig, Member, decide
 from core.pose import VARIANTS, PoseConfig, PoseEstimator
 from core.reference import Reference, build_reference
-from core.verification import agreement
+from core.verification import verify
 from core.views import Burst
 
 WARM_UP = 1
@@ -136,11 +136,8 @@ def _decide(memory: Sequence[Member], target: EncodedBurst, score: str) -> dict[
 def _verify(member: Member, target: EncodedBurst, reference: Reference, whitening: Whitening | None) -> dict[str, float]:
     """With the poses of as many categories as are ever tried, which are one and the same here."""
 
-    def verify(category_id: str) -> float:
-        pose = PoseEstimator(PoseConfig.named("best")).estimate(reference, target).target_from_reference
-        return agreement(reference, target, pose, whitening)
-
-    decide([replace(member, category_id=str(copy)) for copy in range(VERIFIED)], target, context=Context(whitening, verify=verify))
+    context = Context(whitening, verify=lambda category_id: verify(reference, target, whitening)[1])
+    decide([replace(member, category_id=str(copy)) for copy in range(VERIFIED)], target, context=context)
     return {}
 
 

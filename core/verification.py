@@ -13,12 +13,24 @@ from core.dense import DenseAgreement, DenseConfig
 from core.descriptors import unit
 from core.encode import EncodedBurst, EncodedView
 from core.estimators.batched import Sim3Batch
+from core.matches import PoseEstimate
+from core.pose import PoseConfig, PoseEstimator
 from core.reference import Reference
 from core.sim3 import Sim3
 from core.views import FloatArray
 
 DENSE = DenseConfig(points=700, sigma=0.1)
 """Wider than for ranking poses: objects of a kind differ in shape."""
+
+
+VERIFYING = PoseConfig.named("best")
+"""The poses that verify, whatever variant an answer's pose is of: the shipped figures are of these."""
+
+
+def verify(reference: Reference, target: EncodedBurst, whitening: Whitening | None, *, seed: int = 0) -> tuple[PoseEstimate, float]:
+    """The best pose of a reference on a burst, and their `agreement` there. Raises as `PoseEstimator.estimate` does."""
+    estimate = PoseEstimator(VERIFYING).estimate(reference, target, seed=seed)
+    return estimate, agreement(reference, target, estimate.target_from_reference, whitening)
 
 
 def agreement(reference: Reference, target: EncodedBurst, target_from_reference: Sim3, whitening: Whitening | None) -> float:

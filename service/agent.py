@@ -19,13 +19,14 @@ from core.packing import burst_from_arrays
 from core.pose import PoseConfig, PoseEstimator, PoseOptions
 from core.reference import Reference
 from core.scan import DEFAULT_VIEWPOINTS, ScanOptions, ScanRequest, request_scan
+from core.verification import VERIFYING
 from core.views import Burst, View
 from service.batching import BatchingBackbone
 from service.curation import Curation
 from service.events import Events
 from service.features import best_pair, features_as_arrays
 from service.goals import Rearranging
-from service.judgement import VERIFYING, Judge, Judgement
+from service.judgement import Judge, Judgement
 from service.scanning import Scanning
 from service.turn import require_wanted
 from service.upkeep import Upkeep

@@ -13,16 +13,13 @@ from core.errors import InvalidInput, NoObject, NoPose, Unavailable
 from core.matches import PoseEstimate
 from core.next_view import Candidate, next_viewpoints
 from core.novelty import BEST, Context, Decision, DecisionConfig, decide
-from core.pose import PoseConfig, PoseEstimator
 from core.reference import Reference
-from core.verification import agreement
+from core.verification import verify
 from service.turn import require_wanted
 from store.memory import Memory
 
 CALIBRATED_BY = 300
 """Latest decisions that the threshold is made of; objects and places of long ago need not be today's."""
-VERIFYING = PoseConfig.named("best")
-"""The poses that verify, whatever variant the answer's pose is of: the shipped figures are of these."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,11 +58,11 @@ class Judge:
         require_wanted()
         try:
             reference = self.memory.categories.reference(category_id)
-            estimate = PoseEstimator(VERIFYING).estimate(reference, self.encoded, seed=self.seed)
+            estimate, found = verify(reference, self.encoded, self.whitening, seed=self.seed)
         except (NoPose, InvalidInput, Unavailable):  # nothing of the reference is found in the burst, or the reference is damaged
             return 0.0
         self.poses[category_id] = (reference, estimate)
-        return agreement(reference, self.encoded, estimate.target_from_reference, self.whitening)
+        return found
 
     def _viewpoints(self, decision: Decision) -> NDArray[np.floating] | None:
         tried = [self.poses[category] for category, _ in decision.similarities if category in self.poses]

@@ -13,6 +13,10 @@ Data = Annotated[Path, typer.Option(help="Recorded objects: a folder in the data
 JsonFile = Annotated[Path | None, typer.Option("--json", help='File for {"meta": …, "rows": …}.')]
 Seed = Annotated[int, typer.Option(help="Of every random choice.")]
 Backbone = Annotated[str, typer.Option(help="dinov2-s14, dino-s8, or a folder of the DINO family.")]
+Categories = Annotated[list[str] | None, typer.Option(help="Category of the simulator; may be repeated; all where left out.")]
+Samples = Annotated[Path | None, typer.Option(help="Folder of recorded objects; the samples of the repository where left out.")]
+Url = Annotated[str | None, typer.Option(help="A service of this machine; one of its own where left out.")]
+Plot = Annotated[Path | None, typer.Option(help="File for the curves, .png or .svg.")]
 BACKBONE = "dinov2-s14"
 
 
@@ -79,7 +83,7 @@ def discovery(
     seed: Seed = 0,
     backbone: Backbone = BACKBONE,
     poses: Annotated[bool, typer.Option(help="Verify by pose where there is depth: one solve for each pair of objects, cached.")] = True,
-    plot: Annotated[Path | None, typer.Option(help="File for the curves, .png or .svg.")] = None,
+    plot: Plot = None,
     json: JsonFile = None,
 ) -> None:
     """How well known and novel objects are told apart."""
@@ -90,7 +94,7 @@ def discovery(
 
 @app.command()
 def speed(
-    data: Annotated[Path | None, typer.Option(help="Folder of recorded objects; the samples of the repository where left out.")] = None,
+    data: Samples = None,
     views: Annotated[int, typer.Option(min=2, help="Views of the object and of the reference.")] = 10,
     rounds: Annotated[int, typer.Option(min=1, help="Times each operation is timed.")] = 5,
     backbone: Backbone = BACKBONE,
@@ -105,7 +109,7 @@ def speed(
 
 @app.command()
 def rendering(
-    category: Annotated[list[str] | None, typer.Option(help="Category of the simulator; may be repeated; all where left out.")] = None,
+    category: Categories = None,
     frames: Annotated[int, typer.Option(min=1, help="Frames of each object.")] = 12,
     seed: Seed = 0,
     json: JsonFile = None,
@@ -118,7 +122,7 @@ def rendering(
 
 @app.command("next-view")
 def next_view(
-    category: Annotated[list[str] | None, typer.Option(help="Category of the simulator; may be repeated; all where left out.")] = None,
+    category: Categories = None,
     instances: Annotated[int, typer.Option(min=1, help="Objects met of each category.")] = 3,
     looks: Annotated[int, typer.Option(min=1, max=12, help="Views of one side with which an answer is first sought.")] = 2,
     rate: Annotated[float, typer.Option(help="False-known rate asked for.")] = 0.01,
@@ -137,10 +141,10 @@ def load(
     robots: Annotated[list[int], typer.Option(help="Robots at once; may be repeated.")] = [1, 2, 4, 8, 16, 32],  # noqa: B006
     seconds: Annotated[float, typer.Option(min=1, help="For each number of robots.")] = 45,
     views: Annotated[int, typer.Option(min=1, help="Of an observation.")] = 4,
-    data: Annotated[Path | None, typer.Option(help="Folder of recorded objects; the samples of the repository where left out.")] = None,
-    url: Annotated[str | None, typer.Option(help="A service of this machine; one of its own where left out.")] = None,
+    data: Samples = None,
+    url: Url = None,
     seed: Seed = 0,
-    plot: Annotated[Path | None, typer.Option(help="File for the curves, .png or .svg.")] = None,
+    plot: Plot = None,
     json: JsonFile = None,
 ) -> None:
     """Throughput, times, queue, refusals and memory of a service that many robots ask at once."""
@@ -155,10 +159,10 @@ def soak(
     robots: Annotated[int, typer.Option(min=1, help="Robots at once.")] = 2,
     most_growth: Annotated[float, typer.Option(min=0, help="Share by which the settled process may grow; it exits with 1 above.")] = 0.05,
     views: Annotated[int, typer.Option(min=2, help="Of an observation.")] = 4,
-    data: Annotated[Path | None, typer.Option(help="Folder of recorded objects; the samples of the repository where left out.")] = None,
-    url: Annotated[str | None, typer.Option(help="A service of this machine; one of its own where left out.")] = None,
+    data: Samples = None,
+    url: Url = None,
     seed: Seed = 0,
-    plot: Annotated[Path | None, typer.Option(help="File for the curves, .png or .svg.")] = None,
+    plot: Plot = None,
     json: JsonFile = None,
 ) -> None:
     """Whether a service that works for long grows: resident memory, once settled and at the end."""
