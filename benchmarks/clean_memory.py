@@ -20,10 +20,9 @@ from core.encode import EncodedBurst
 from core.errors import InvalidInput, NoPose
 from core.evidence import sample_patches
 from core.novelty import Context, Decision, Member, decide
-from core.pose import PoseConfig, PoseEstimator
 from core.reference import Reference, build_reference
 from core.sim3 import Sim3
-from core.verification import agreement
+from core.verification import verify
 
 
 @dataclass(frozen=True)
@@ -117,10 +116,10 @@ def decide_by(memory: Sequence[Known], category: str, target: Path, whitening: W
 def _lay(known: Known, burst: EncodedBurst, whitening: Whitening | None, seed: int) -> Laid:
     reference = _reference(known)
     try:
-        found = PoseEstimator(PoseConfig.named("best")).estimate(reference, burst, seed=seed).target_from_reference
+        estimate, found = verify(reference, burst, whitening, seed=seed)
     except (NoPose, InvalidInput):  # nothing of the reference is found, or the burst has no depth on the object
         return Laid(None, 0.0)
-    return Laid(found, agreement(reference, burst, found, whitening))
+    return Laid(estimate.target_from_reference, found)
 
 
 def _seen(known: Known) -> EncodedBurst:
