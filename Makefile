@@ -2,7 +2,7 @@
 SHELL := /bin/bash
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help setup weights demo test lint types unit browser serve bench soak fuzz clean
+.PHONY: help setup weights demo test lint types unit browser cluster serve bench soak fuzz clean
 
 # The python to build the environment with: the newest of 3.10 and later on the PATH.
 PYTHON ?= $(shell for name in python3.13 python3.12 python3.11 python3.10 python3 python; do \
@@ -67,6 +67,9 @@ unit: setup browser
 
 fuzz: setup ## feed everything that reads uploads what breaks it, ten minutes long; what it finds is kept in OUT
 	@$(BIN)/python -m tests.fuzz --seconds $(FUZZ_SECONDS) --found $(OUT)/fuzz
+
+cluster: setup ## kill the parts of a service on Ray Serve, one after the other: they come back, and nothing that was answered is lost
+	@$(BIN)/pytest tests/service/cluster/recovery.py
 
 serve: setup ## the service on 127.0.0.1:8000
 	@$(BIN)/onelook serve

@@ -28,6 +28,10 @@ class InvalidInput(OneLookError):
         self.field = field
         self.message = message
 
+    def __reduce__(self) -> tuple[type[InvalidInput], tuple[str, str]]:
+        """Made anew from its parts in another process."""
+        return type(self), (self.field, self.message)
+
 
 class TooFewViews(InvalidInput):
     """More views are needed than were given."""

@@ -10,18 +10,18 @@ from core.agreement import agreeing
 from core.boxes import OrientedBox
 from core.clock import StageClock
 from core.coherence import require_one_unit
-from core.encode import EncodedBurst, Encoder
+from core.encode import EncodedBurst
 from core.errors import Conflict, InvalidInput, NoPose, NotFound, Unavailable
 from core.grounds import grounds
 from core.matches import PoseEstimate
 from core.novelty import DEFAULT_SCORE, Decision, DecisionConfig
 from core.packing import burst_from_arrays
-from core.pose import PoseConfig, PoseEstimator, PoseOptions
+from core.pose import PoseConfig, PoseOptions
 from core.reference import Reference
 from core.scan import DEFAULT_VIEWPOINTS, ScanOptions, ScanRequest, request_scan
 from core.verification import VERIFYING
 from core.views import Burst, View
-from service.batching import BatchingBackbone
+from service.compute import Compute, Named
 from service.curation import Curation
 from service.events import Events
 from service.features import best_pair, features_as_arrays
@@ -84,15 +84,16 @@ _PoseOrReason = tuple[PoseEstimate | None, Pose | None, str | None]
 class Agent:
     """One memory and the backbone that fills it. Safe to use from several threads."""
 
-    def __init__(self, backbone: BatchingBackbone, memory: Memory, config: AgentConfig, events: Events | None = None) -> None:
+    def __init__(self, compute: Compute, memory: Memory, config: AgentConfig, events: Events | None = None) -> None:
         """Raises Conflict where the memory was made with another backbone, InvalidInput for an unknown score or variant."""
         config.validate()
-        memory.require_backbone(backbone.name, backbone.fingerprint)
-        self.backbone = backbone
+        memory.require_backbone(compute.backbone.name, compute.backbone.fingerprint)
+        self.backbone = compute.backbone
+        self.encoder = compute.encoder
+        self.solver = compute.solver
         self.memory = memory
         self.config = config
         self.events = events or Events()
-        self.encoder = Encoder(backbone)
         self.scanning = Scanning(self.encoder, memory, self.events, config.scan_views)
         self.curation = Curation(self.encoder, memory, self.events, config.score)
         self.upkeep = Upkeep(memory, self.events, config.score, config.threshold, config.false_known_rate)
@@ -104,7 +105,7 @@ class Agent:
         Raises NotFound for an unknown category, InvalidInput for an unknown variant, NoObject where nothing is seen.
         """
         options = options or ObserveOptions()
-        estimator = PoseEstimator(self._pose_config(options, burst))
+        config = self._pose_config(options, burst)
         if options.category_id is not None:
             self.memory.categories.get(options.category_id)
         clock = StageClock()
@@ -113,17 +114,17 @@ class Agent:
         clock.lap("encode")
         for _ in range(DECISIONS - 1):
             try:
-                return self._answer(burst, encoded, options, estimator, clock, frame)
+                return self._answer(burst, encoded, options, config, clock, frame)
             except (NotFound, Conflict):
                 if options.category_id is not None:
                     raise
-        return self._answer(burst, encoded, options, estimator, clock, frame)
+        return self._answer(burst, encoded, options, config, clock, frame)
 
     def _answer(
-        self, burst: Burst, encoded: EncodedBurst, options: ObserveOptions, estimator: PoseEstimator, clock: StageClock, frame: str | None
+        self, burst: Burst, encoded: EncodedBurst, options: ObserveOptions, config: PoseConfig, clock: StageClock, frame: str | None
     ) -> Observation:
         """Raises NotFound or Conflict where the category that was decided for is deleted meanwhile."""
-        judge = Judge(self.memory, encoded, self.backbone.whitening, options.seed)
+        judge = self._judge_of(encoded, options.seed)
         judged = None if options.category_id is not None else self._judge(judge, options)
         decision = judged.decision if judged else None
         clock.lap("decide")
@@ -134,7 +135,7 @@ class Agent:
         if outcome == "known":
             category_id = decision.similarities[0][0] if decision else options.category_id
             assert category_id is not None
-            pose = self._pose(category_id, burst, judge, estimator, clock)
+            pose = self._pose(category_id, burst, judge, config, clock)
         elif outcome == "novel":
             request, scan_error = self._scan_or_reason(encoded, options.up)
         estimate, record, pose_error = pose
@@ -153,7 +154,7 @@ class Agent:
 
     def decide(self, encoded: EncodedBurst, seed: int = 0) -> Decision:
         """What a burst is taken for, without keeping or learning anything."""
-        return self._judge(Judge(self.memory, encoded, self.backbone.whitening, seed), ObserveOptions(learn=False)).decision
+        return self._judge(self._judge_of(encoded, seed), ObserveOptions(learn=False)).decision
 
     def names(self) -> dict[str, str | None]:
         """Of all categories, by id."""
@@ -171,21 +172,24 @@ class Agent:
             return config
         return replace(config, best=replace(config.best, alternatives=options.alternatives))
 
+    def _judge_of(self, encoded: EncodedBurst, seed: int) -> Judge:
+        return Judge(self.memory, encoded, self.backbone.whitening, self.solver, seed)
+
     def _judge(self, judge: Judge, options: ObserveOptions) -> Judgement:
         threshold = self.config.threshold if options.threshold is None else options.threshold
         rate = self.upkeep.false_known_rate if options.false_known_rate is None else options.false_known_rate
         judged = judge.judge(DecisionConfig(self.config.score, threshold, rate))
         return judged if options.learn else replace(judged, decision=replace(judged.decision, rival=None))
 
-    def _pose(self, category_id: str, burst: Burst, judge: Judge, estimator: PoseEstimator, clock: StageClock) -> _PoseOrReason:
-        if category_id in judge.poses and estimator.config == VERIFYING:
+    def _pose(self, category_id: str, burst: Burst, judge: Judge, config: PoseConfig, clock: StageClock) -> _PoseOrReason:
+        if category_id in judge.poses and config == VERIFYING:
             reference, estimate = judge.poses[category_id]
             return estimate, _pose_record(estimate, reference, burst), None
         require_wanted()
         try:
             reference = self.memory.categories.reference(category_id)
             clock.lap("load")
-            estimate = estimator.estimate(reference, judge.encoded, seed=judge.seed)
+            estimate = self.solver.estimate(Named(category_id, reference), config, judge.encoded, seed=judge.seed)
         except (NoPose, InvalidInput, Unavailable) as error:  # one damaged category leaves the others working
             return None, None, str(error)
         finally:

@@ -22,6 +22,7 @@ from service.agent import Agent, AgentConfig
 from service.auth import Guard
 from service.batching import BatchingBackbone
 from service.browsers import OwnPagesOnly
+from service.compute import Compute, local
 from service.console.demo import Demo
 from service.console.install import install as install_console
 from service.events import Event, Events
@@ -41,17 +42,17 @@ PRUNE_EVERY_S = 3600
 log = logging.getLogger("onelook")
 
 
-def create_app(settings: Settings, *, backbone: Backbone | None = None, asks: bool = True) -> FastAPI:
+def create_app(settings: Settings, *, backbone: Backbone | None = None, compute: Compute | None = None, asks: bool = True) -> FastAPI:
     """The service with these settings; it opens its memory and loads its backbone (unless one is given) when it starts.
 
-    `asks` is False where nobody but this process reaches it: then it asks for no key.
+    `compute` is given where others have the backbone. `asks` is False where nobody but this process reaches it: then it asks for no key.
     """
 
     metrics = Metrics()
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
-        with open_agent(settings, backbone, metrics) as agent:
+        with open_agent(settings, metrics, backbone, compute) as agent:
             app.state.agent = agent
             app.state.guard = Guard(agent.memory.keys, agent.memory.sessions, settings.rate_limit, asks=asks)
             app.state.work = work = metrics.watched_queue(settings.workers, settings.queue, settings.deadline_s)
@@ -102,18 +103,19 @@ async def _keep_pruned(memory: Memory) -> None:
 
 
 @contextmanager
-def open_agent(settings: Settings, backbone: Backbone | None, metrics: Metrics) -> Iterator[Agent]:
-    """The agent of these settings, with its memory open until the end; loads its backbone unless one is given.
+def open_agent(settings: Settings, metrics: Metrics, backbone: Backbone | None, compute: Compute | None) -> Iterator[Agent]:
+    """The agent of these settings, with its memory open until the end; loads its backbone unless one, or what computes, is given.
 
     Raises what `Settings`, `Memory.open`, `load_backbone` and `Agent` raise.
     """
-    with _checked(settings, backbone) as (opened, loaded, config):
+    with _checked(settings) as (opened, config):
 
         def tell(event: Event) -> None:
             metrics.count_event(event)
             log_event(event)
 
-        agent = Agent(BatchingBackbone(loaded, metrics.count_pass), opened, config, Events(tell))
+        chosen = compute or local(BatchingBackbone(backbone or warm_backbone(settings), metrics.count_pass))
+        agent = Agent(chosen, opened, config, Events(tell))
         try:
             yield agent
         finally:
@@ -122,23 +124,30 @@ def open_agent(settings: Settings, backbone: Backbone | None, metrics: Metrics) 
 
 def checked_backbone(settings: Settings) -> Backbone:
     """The backbone of these settings, once all is checked that can keep the service from starting. Raises as `open_agent` does."""
-    with _checked(settings) as (opened, loaded, _):
+    with _checked(settings) as (opened, _):
+        loaded = warm_backbone(settings)
         opened.require_backbone(loaded.name, loaded.fingerprint)
         return loaded
 
 
+def require_startable(settings: Settings) -> None:
+    """Raises what would keep the service from starting, but for its backbone."""
+    with _checked(settings):
+        pass
+
+
 @contextmanager
-def _checked(settings: Settings, backbone: Backbone | None = None) -> Iterator[tuple[Memory, Backbone, AgentConfig]]:
+def _checked(settings: Settings) -> Iterator[tuple[Memory, AgentConfig]]:
     """What is wrong with the settings is told before a backbone is loaded, which takes long."""
     settings.require_consistent()
     config = AgentConfig(settings.score, settings.threshold, settings.variant, settings.scan_views, settings.false_known_rate)
     config.validate()
     with Memory.open(settings.data_dir, settings.retention) as opened:
         settings.require_safe(len(opened.keys.all()))
-        yield opened, backbone or _warm_backbone(settings), config
+        yield opened, config
 
 
-def _warm_backbone(settings: Settings) -> Backbone:
+def warm_backbone(settings: Settings) -> Backbone:
     """Loaded, and used once: whoever is answered first does not wait for memory and kernels."""
     loaded = load_backbone(settings.backbone, device=settings.device, report=log.info)
     side = EncoderConfig().grid * loaded.patch_size

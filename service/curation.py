@@ -9,12 +9,12 @@ import numpy as np
 
 from core.agreement import agreeing
 from core.descriptors import unit
-from core.encode import Encoder
 from core.errors import Conflict, InvalidInput, Unavailable
 from core.novelty import SCORES, Member
 from core.packing import burst_from_arrays
 from core.reference import MIN_VIEWS, build_reference
 from core.views import Burst, FloatArray
+from service.compute import Encodes
 from service.events import Events
 from store.memory import Memory
 from store.records import Category, Instance, Observation
@@ -56,7 +56,7 @@ class MergePreview:
 class Curation:
     """Changes of one memory's categories."""
 
-    def __init__(self, encoder: Encoder, memory: Memory, events: Events, score: str) -> None:
+    def __init__(self, encoder: Encodes, memory: Memory, events: Events, score: str) -> None:
         self._encoder = encoder
         self._memory = memory
         self._events = events

@@ -14,7 +14,7 @@ from core.matches import PoseEstimate
 from core.next_view import Candidate, next_viewpoints
 from core.novelty import BEST, Context, Decision, DecisionConfig, decide
 from core.reference import Reference
-from core.verification import verify
+from service.compute import Named, Solves
 from service.turn import require_wanted
 from store.memory import Memory
 
@@ -38,6 +38,7 @@ class Judge:
     memory: Memory
     encoded: EncodedBurst
     whitening: Whitening | None
+    solver: Solves
     seed: int = 0
     poses: dict[str, tuple[Reference, PoseEstimate]] = field(default_factory=dict)
     """By category, those that were tried."""
@@ -58,7 +59,7 @@ class Judge:
         require_wanted()
         try:
             reference = self.memory.categories.reference(category_id)
-            estimate, found = verify(reference, self.encoded, self.whitening, seed=self.seed)
+            estimate, found = self.solver.verify(Named(category_id, reference), self.encoded, self.whitening, seed=self.seed)
         except (NoPose, InvalidInput, Unavailable):  # nothing of the reference is found in the burst, or the reference is damaged
             return 0.0
         self.poses[category_id] = (reference, estimate)

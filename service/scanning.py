@@ -9,13 +9,13 @@ import numpy as np
 
 from core.agreement import agreeing
 from core.coherence import require_one_unit
-from core.encode import Encoder
 from core.errors import InvalidInput, TooFewViews
 from core.packing import burst_from_arrays
 from core.quality import ViewFault, faults, region_of_mask, region_of_sphere
 from core.reference import MIN_VIEWS, build_reference
 from core.scan import Coverage, ScanOptions, ScanRequest, coverage, exclude, request_scan
 from core.views import Burst, View
+from service.compute import Encodes
 from service.events import Events
 from store.memory import Memory
 from store.records import Category, Scan
@@ -33,7 +33,7 @@ class Progress:
 class Scanning:
     """The scans of one memory."""
 
-    def __init__(self, encoder: Encoder, memory: Memory, events: Events, viewpoints: int) -> None:
+    def __init__(self, encoder: Encodes, memory: Memory, events: Events, viewpoints: int) -> None:
         """`viewpoints` is how many a scan asks for where its caller does not say."""
         self._encoder = encoder
         self._memory = memory

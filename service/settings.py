@@ -46,6 +46,8 @@ class Settings(BaseSettings):
     log: Form = Field("text", description="Lines of the log: `text` for people, `json` for programs.")
     session_h: float = Field(12, gt=0, description="Hours after which somebody who signed in to the console is signed out.")
     backup_dir: Path | None = Field(None, description="Folder that backups are made in; beside the memory where left out.")
+    encoders: int = Field(2, gt=0, description="Processes that encode bursts, of `onelook serve --cluster`.")
+    solvers: int = Field(2, gt=0, description="Processes that solve poses, of `onelook serve --cluster`.")
     max_views: int = Field(32, gt=0, description="Most views in one burst.")
     max_megapixels: int = Field(128, gt=0, description="Most pixels of a burst, all views together; decoded, each takes 8 to 16 bytes.")
     scan_views: int = Field(10, ge=2, le=64, description="Viewpoints that a scan asks for.")

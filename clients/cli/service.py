@@ -47,21 +47,38 @@ def serve(
     backbone: Annotated[str | None, typer.Option(help="dinov2-s14 (where left out), dino-s8, or a folder of the DINO family.")] = None,
     device: Annotated[str | None, typer.Option(help="Torch device: cpu where left out, cuda, cuda:1.")] = None,
     threshold: Annotated[float | None, typer.Option(help="Least similarity of a known object; the score's own where left out.")] = None,
+    cluster: Annotated[bool, typer.Option("--cluster", help="On Ray Serve: what computes is in processes of its own.")] = False,
 ) -> None:
     """Start the service. What has no option here is set by the variables below."""
-    from service.app import checked_backbone, create_app
     from service.logs import config
-    from service.server import Server
 
     given = {"host": host, "port": port, "data_dir": data_dir, "backbone": backbone, "device": device, "threshold": threshold}
     settings = read_settings({name: value for name, value in given.items() if value is not None})
     logging.config.dictConfig(config(settings.log))
+    start = _serve_cluster if cluster else _serve_here
+    start(settings)
+
+
+def _serve_here(settings: Settings) -> None:
+    from service.app import checked_backbone, create_app
+    from service.server import Server
+
     with _bound(settings.host, settings.port) as listener:
         # Opened once before uvicorn starts, which would wrap the sentence that says what is wrong in a traceback.
         app = create_app(settings, backbone=checked_backbone(settings))
         log.info("serving on http://%s:%d, memory in %s; Ctrl+C stops it", settings.host, listener.getsockname()[1], settings.data_dir)
         with contextlib.suppress(KeyboardInterrupt):
             Server(app).run(sockets=[listener])
+
+
+def _serve_cluster(settings: Settings) -> None:
+    try:
+        from service.cluster.running import run
+    except ModuleNotFoundError as error:
+        raise Unavailable(f"--cluster needs {error.name}; install it with: pip install 'onelook[server,cluster]'") from error
+    with _bound(settings.host, settings.port) as listener:
+        port = listener.getsockname()[1]  # Ray Serve binds it itself
+    run(settings.model_copy(update={"port": port}))
 
 
 def read_settings(given: dict[str, object]) -> Settings:

@@ -145,7 +145,7 @@ def distributions(names: set[str]) -> set[str]:
 @pytest.mark.parametrize("package", ALLOWED)
 def test_what_is_imported_is_a_direct_dependency(package: str) -> None:
     imported = {name for path in modules(package) for name, _ in imports(path)}
-    assert distributions(imported) <= declared("cli", "server", "colmap", "realsense")
+    assert distributions(imported) <= declared("cli", "server", "cluster", "colmap", "realsense")
 
 
 def test_core_touches_no_files_but_weights() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from service.agent import Agent, AgentConfig, ObserveOptions
+from service.compute import local
 from store.memory import Memory
 
 
@@ -12,7 +13,7 @@ from store.memory import Memory
 def agent(tmp_path, backbone, look):
     """An agent that knows one kind of object."""
     with Memory.open(tmp_path / "memory") as memory:
-        made = Agent(backbone, memory, AgentConfig("best", variant="best"))
+        made = Agent(local(backbone), memory, AgentConfig("best", variant="best"))
         scan = made.scanning.begin(look())
         made.scanning.add(scan.id, look())
         made.scanning.complete(scan.id)

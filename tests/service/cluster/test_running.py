@@ -1,0 +1,115 @@
+"""The application on Ray Serve answers as it does in one process."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+import pytest
+from fastapi.testclient import TestClient
+
+from core.sim3 import Sim3
+from core.views import Burst, View
+from service.app import create_app
+
+TIMES = {"created_at", "expires_at", "timings_ms"}
+"""What no two runs have in common."""
+
+
+@pytest.fixture
+def alone(settings: Any, backbone: Any) -> Iterator[TestClient]:
+    """The same service in this process."""
+    with TestClient(create_app(settings.model_copy(update={"score": "best"}), backbone=backbone)) as client:
+        yield client
+
+
+def comparable(answer: Any, names: dict[str, str], number: Callable[[float], Any] = float) -> Any:
+    """An answer without times, its ids called by the order in which they first came."""
+    if isinstance(answer, dict):
+        return {key: comparable(value, names, number) for key, value in answer.items() if key not in TIMES}
+    if isinstance(answer, list):
+        return [comparable(each, names, number) for each in answer]
+    if isinstance(answer, float):
+        return number(answer)
+    if isinstance(answer, str):
+        for word in answer.replace("'", " ").replace("/", " ").split():
+            if len(word) == 32 and set(word) <= set("0123456789abcdef"):
+                answer = answer.replace(word, names.setdefault(word, f"id-{len(names)}"))
+    return answer
+
+
+def life(http: Any, look: Callable[..., Burst], parts: Callable[..., Any]) -> list[Any]:
+    """What a robot and a person ask, and what they are answered."""
+    answers: list[Any] = []
+
+    def ask(method: str, path: str, **request: Any) -> Any:
+        response = http.request(method, path, **request)
+        body = response.json() if response.content and "json" in response.headers["content-type"] else len(response.content) > 0
+        answers.append([method, response.status_code, body])
+        return body
+
+    for kind, name in (("bright", "lamp"), ("dark", None)):
+        ask("POST", "/v1/observations", files=parts(look(kind)))
+        scan = ask("POST", "/v1/scans", files=parts(look(kind)))
+        ask("POST", f"/v1/scans/{scan['id']}/views", files=parts(look(kind)))
+        ask("POST", f"/v1/scans/{scan['id']}/complete", json={"name": name})
+    turned = Sim3(1.0, np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]]), np.array([0.1, 0.2, 0.0]))
+    there = parts(look("bright", views=5, world_from_object=turned))
+    ask("POST", "/v1/observations", files=there)
+    seen = ask("POST", "/v1/observations?false_known_rate=0.4", files=there)
+    ask("POST", "/v1/observations?variant=best&learn=false&include=debug", files=parts(look("dark", views=4)))
+    ask("GET", f"/v1/observations/{seen['id']}/overlay.png")
+    category_id = seen["similarities"][0]["category_id"]
+    goal = ask("POST", f"/v1/categories/{category_id}/goals", json={"observation_id": seen["id"]})
+    ask("POST", f"/v1/goals/{goal['id']}/plan", files=parts(look("bright", views=4)))
+    ask("DELETE", f"/v1/categories/{category_id}")
+    ask("POST", "/v1/observations?learn=false", files=parts(look("bright", views=5)))
+    ask("POST", f"/v1/observations?category_id={category_id}", files=parts(look("bright", views=5)))
+    ask("POST", "/v1/observations", files=parts(Burst([View(np.zeros_like(each.rgb), each.depth_m, each.camera) for each in look().views])))
+    ask("GET", "/v1/categories")
+    ask("GET", "/v1/info")
+    return answers
+
+
+def test_it_answers_as_one_process_does(cluster: Any, alone: TestClient, look: Any, parts: Any) -> None:
+    told, expected = life(cluster.http, look, parts), life(alone, look, parts)
+    assert comparable(told, {}) == comparable(expected, {}, lambda value: pytest.approx(value, rel=1e-6, abs=1e-9))
+    outcomes = [body["outcome"] for _, status, body in told if status == 201 and isinstance(body, dict) and "outcome" in body]
+    assert {"known", "novel"} <= set(outcomes)
+
+
+def test_all_that_are_asked_at_once_answer_from_what_was_learnt_last(cluster: Any, look: Any, parts: Any) -> None:
+    """Two encoders and two solvers take part, and none of them knows less than the others."""
+    for name in ("first", "second"):
+        scan = cluster.http.post("/v1/scans", files=parts(look("bright"))).json()
+        assert cluster.http.post(f"/v1/scans/{scan['id']}/views", files=parts(look("bright"))).status_code == 200
+        made = cluster.http.post(f"/v1/scans/{scan['id']}/complete", json={"name": name}).json()
+        version = cluster.http.get("/v1/info").json()["memory_version"]
+        before = {part: cluster.processes(part) for part in ("Encoder", "PoseSolver")}
+        body = parts(look("bright", views=4))
+        with ThreadPoolExecutor(8) as robots:
+            asked = f"/v1/observations?learn=false&category_id={made['id']}"
+            answers = list(robots.map(lambda _, asked=asked, body=body: cluster.http.post(asked, files=body), range(8)))
+        assert [answer.status_code for answer in answers] == [201] * 8
+        assert len({str(answer.json()["pose"]["target_from_reference"]) for answer in answers}) == 1
+        assert {answer.json()["name"] for answer in answers} == {name}
+        assert cluster.http.get("/v1/info").json()["memory_version"] == version + 8
+        for part, earlier in before.items():
+            now = cluster.processes(part)
+            assert len(earlier) == 2
+            assert all(now[pid] > seconds for pid, seconds in earlier.items()), f"an idle {part}: {earlier}, {now}"
+        assert cluster.http.delete(f"/v1/categories/{made['id']}").status_code == 204
+
+
+def test_nothing_of_it_is_told_to_others_and_it_listens_here(cluster: Any) -> None:
+    environment = dict(line.split("=", 1) for line in _environment(next(iter(cluster.processes("Encoder")))))
+    assert environment["RAY_USAGE_STATS_ENABLED"] == "0"
+    assert environment["RAY_AUTH_MODE"] == "token"
+    assert cluster.http.get("/metrics").status_code == 200
+
+
+def _environment(pid: int) -> list[str]:
+    with open(f"/proc/{pid}/environ") as file:
+        return [each for each in file.read().split("\0") if "=" in each]
