@@ -11,9 +11,8 @@ Letters: V, W views, K patches a view, D token size, C categories.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol, TypeVar
 
 import numpy as np
 import torch
@@ -21,7 +20,6 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from core.backbones.whitening import Whitening
-from core.descriptors import unit
 from core.encode import EncodedBurst
 
 FloatArray = NDArray[np.floating]
@@ -40,8 +38,6 @@ ADAPTED = 4
 """Every so many-th patch takes part in the statistics: there are thousands, alike within a view."""
 BATCH = 16
 """Bursts matched at once: about 40 MB."""
-MOST_MEMBERS = 256
-"""Of a larger memory the members most similar by pooled tokens are compared patch by patch."""
 
 
 def sample_patches(encoded: EncodedBurst, patches: int = PATCHES) -> NDArray[np.float16]:
@@ -119,26 +115,6 @@ def cohort_level(matches: FloatArray, prior: float, cohort: int = COHORT) -> Flo
     return np.asarray((np.where(there, best, prior).sum(axis=-1) + prior * max(cohort - count, 0)) / cohort)
 
 
-class HasPooled(Protocol):
-    """Anything with one pooled token a view."""
-
-    @property
-    def pooled(self) -> FloatArray:
-        """Shape (V, D)."""
-
-
-Pooled = TypeVar("Pooled", bound=HasPooled)
-
-
-def most_similar_members(members: Sequence[Pooled], pooled: FloatArray) -> list[Pooled]:
-    """All of a small memory, in order; of a larger one the MOST_MEMBERS whose pooled tokens are nearest any of these, shape (V, D)."""
-    if len(members) <= MOST_MEMBERS:
-        return list(members)
-    asked = unit(pooled)
-    nearness = [float((unit(member.pooled) @ asked.T).max()) for member in members]
-    return [members[index] for index in sorted(np.argsort(nearness)[-MOST_MEMBERS:])]
-
-
 @dataclass(frozen=True, eq=False)
 class Entry:
     """A member of the memory as the evidence sees it."""
@@ -148,34 +124,57 @@ class Entry:
     """Unit patches, adapted to the memory, shape (V, K, D)."""
 
 
+@dataclass(frozen=True, eq=False)
 class Comparison:
-    """One burst against a memory. A category's first member, its founder, represents it to others."""
+    """One burst against the categories of a memory, or the nearest of them.
 
-    def __init__(self, entries: Sequence[Entry], target: Tensor, cohort_prior: float) -> None:
-        """`target`: unit patches, adapted to the same memory, shape (V, K, D)."""
-        self._entries, self._prior = entries, cohort_prior
-        self._matches = match_views(target, [entry.patches for entry in entries])
-        self._of: dict[str, list[int]] = {}
+    A category's first member, its founder, represents it to others.
+    """
+
+    matches: Mapping[str, float]
+    """By category, of the burst with the member it matches best."""
+    founders: Mapping[str, float]
+    """By category, of the burst with the founder."""
+    cohorts: Mapping[str, Mapping[str, float]]
+    """By category, for those of `best_matching` at least: of the best matching member with the founders of the other categories."""
+    prior: float
+    """Usual match with the most similar of other categories."""
+
+    @staticmethod
+    def between(target: Tensor, entries: Sequence[Entry], prior: float) -> Comparison:
+        """With every member, oldest first, patch by patch: the rule that `core.enrolled` keeps to.
+
+        `target`: unit patches, adapted to the same memory, shape (V, K, D).
+        """
+        found = match_views(target, [entry.patches for entry in entries])
+        best: dict[str, int] = {}
+        founders: dict[str, int] = {}
         for index, entry in enumerate(entries):
-            self._of.setdefault(entry.category_id, []).append(index)
-        self._between: dict[tuple[int, int], float] = {}
+            founders.setdefault(entry.category_id, index)
+            if found[index] > found[best.setdefault(entry.category_id, index)]:
+                best[entry.category_id] = index
+        matches = {category: float(found[index]) for category, index in best.items()}
+        of_founders = [entries[index].patches for index in founders.values()]
+        cohorts = {
+            category: dict(zip(founders, match_views(entries[best[category]].patches, of_founders).tolist()))
+            for category in best_matching(matches)
+        }
+        return Comparison(matches, {category: float(found[index]) for category, index in founders.items()}, cohorts, prior)
 
     def ranked(self, without: str | None = None) -> list[tuple[str, float]]:
         """(category, evidence) of the SHORTLIST best matching categories, most evidence first; as if `without` were not in the memory."""
-        best = {category: max(indices, key=lambda index: self._matches[index]) for category, indices in self._of.items()}
-        best.pop(without or "", None)
-        shortlist = sorted(best, key=lambda category: -self._matches[best[category]])[:SHORTLIST]
-        evidence = {category: self._evidence(best[category], [other for other in best if other != category]) for category in shortlist}
+        shortlist = [category for category in best_matching(self.matches) if category != without][:SHORTLIST]
+        evidence = {category: self._evidence(category, {category, without}) for category in shortlist}
         return sorted(evidence.items(), key=lambda entry: (-entry[1], entry[0]))
 
-    def _evidence(self, member: int, others: Sequence[str]) -> float:
-        founders = [self._of[other][0] for other in others]
-        of_burst = cohort_level(self._matches[founders], self._prior)
-        of_member = cohort_level(self._to_founders(member, founders), self._prior)
-        return float(self._matches[member] - (of_burst + of_member) / 2)
+    def _evidence(self, category: str, left_out: Collection[str | None]) -> float:
+        of_burst, of_member = (
+            cohort_level(np.array([match for other, match in found.items() if other not in left_out]), self.prior)
+            for found in (self.founders, self.cohorts[category])
+        )
+        return float(self.matches[category] - (of_burst + of_member) / 2)
 
-    def _to_founders(self, member: int, founders: Sequence[int]) -> FloatArray:
-        missing = [founder for founder in founders if (member, founder) not in self._between]
-        for founder, match in zip(missing, match_views(self._entries[member].patches, [self._entries[each].patches for each in missing])):
-            self._between[member, founder] = float(match)
-        return np.array([self._between[member, founder] for founder in founders])
+
+def best_matching(matches: Mapping[str, float]) -> list[str]:
+    """The SHORTLIST best matching categories and one more, best first: one may be left out."""
+    return sorted(matches, key=lambda category: -matches[category])[: SHORTLIST + 1]

@@ -16,8 +16,9 @@ from core.backbones.whitening import Whitening
 from core.calibration import Calibration, Prior
 from core.descriptors import unit
 from core.encode import EncodedBurst
+from core.enrolled import Enrolled
 from core.errors import InvalidInput
-from core.evidence import Adaptation, Comparison, Entry, most_similar_members, sample_patches, whitened
+from core.evidence import Adaptation, Comparison, Entry, sample_patches, whitened
 
 FloatArray = NDArray[np.floating]
 Outcome = Literal["known", "uncertain", "novel"]
@@ -169,15 +170,17 @@ class Context:
 
 
 def decide(
-    memory: Sequence[Member], target: EncodedBurst, config: DecisionConfig | None = None, context: Context | None = None
+    memory: Sequence[Member] | Enrolled, target: EncodedBurst, config: DecisionConfig | None = None, context: Context | None = None
 ) -> Decision:
     """The most similar category if it is similar enough; uncertain where that cannot be told; else novel.
 
-    An empty memory finds everything novel. Members without patches are no part of `best`.
+    An empty memory finds everything novel. Members without patches are no part of `best`; enrolled ones serve no other score.
     """
     config = config or DecisionConfig()
     if config.score == BEST:
         return _by_evidence(memory, target, config, context or Context())
+    if isinstance(memory, Enrolled):
+        raise InvalidInput("score", f"{config.score} compares whole members, which are not enrolled; give it the members themselves")
     named = SCORES[config.score]
     limit = named.threshold if config.threshold is None else config.threshold
     tokens: dict[str, list[FloatArray]] = {}
@@ -196,7 +199,7 @@ def _similarity(score: Score, bursts: Sequence[FloatArray], target: FloatArray) 
     return max(score.similarity(burst, target) for burst in bursts)
 
 
-def _by_evidence(memory: Sequence[Member], target: EncodedBurst, config: DecisionConfig, context: Context) -> Decision:
+def _by_evidence(memory: Sequence[Member] | Enrolled, target: EncodedBurst, config: DecisionConfig, context: Context) -> Decision:
     prior, verified = Prior.shipped(), context.verify is not None
     comparison = _compare(memory, target, context.whitening, prior.cohort)
     evidence = comparison.ranked() if comparison else []
@@ -230,11 +233,12 @@ def _by_evidence(memory: Sequence[Member], target: EncodedBurst, config: Decisio
     )
 
 
-def _compare(memory: Sequence[Member], target: EncodedBurst, whitening: Whitening | None, cohort: float) -> Comparison | None:
-    members = most_similar_members([member for member in memory if member.patches is not None], target.pooled)
-    patches = [whitened(member.patches, whitening) for member in members if member.patches is not None]
-    if not patches:
+def _compare(memory: Sequence[Member] | Enrolled, target: EncodedBurst, whitening: Whitening | None, prior: float) -> Comparison | None:
+    if isinstance(memory, Enrolled):
+        return memory.compare(target, prior)
+    members = [(member.category_id, whitened(member.patches, whitening)) for member in memory if member.patches is not None]
+    if not members:
         return None
-    adaptation = Adaptation.fit(patches)
-    entries = [Entry(member.category_id, adaptation.directions(each)) for member, each in zip(members, patches)]
-    return Comparison(entries, adaptation.directions(whitened(sample_patches(target), whitening)), cohort)
+    adaptation = Adaptation.fit([patches for _, patches in members])
+    entries = [Entry(category_id, adaptation.directions(patches)) for category_id, patches in members]
+    return Comparison.between(adaptation.directions(whitened(sample_patches(target), whitening)), entries, prior)

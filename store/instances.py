@@ -8,16 +8,21 @@ from __future__ import annotations
 import hashlib
 import json
 import logging
+from collections.abc import Iterator, Sequence
 from typing import Literal
 
+import numpy as np
 from sqlite_utils import Database
 
+from core.backbones.whitening import Whitening
 from core.encode import EncodedBurst
+from core.enrolled import Enrolled
 from core.errors import Conflict, NotFound, Unavailable
 from core.evidence import sample_patches
+from core.nearness import Listed
 from core.novelty import Member
 from core.views import Burst
-from store.arrays import Array, from_blob, patches_from_blob, patches_to_blob, to_blob
+from store.arrays import BLOB_TYPE, Array, from_blob, patches_from_blob, patches_to_blob, to_blob
 from store.audit import record
 from store.bursts import read_burst
 from store.columns import files_from_json
@@ -29,8 +34,15 @@ COLUMNS = "i.id, i.category_id, i.created_at, i.source, i.source_id, i.how, i.si
 LIVING = "FROM instances i JOIN categories c ON c.id = i.category_id WHERE i.removed_by IS NULL AND c.removed_by IS NULL"
 TOKENS = ("cls", "pooled", "patches")
 """The columns that hold them."""
-Tokens = tuple[Array, Array, Array | None]
-"""[CLS] and pooled, shapes (V, D), and patches, shape (V, K, D), where they were kept."""
+Tokens = tuple[Array, Array]
+"""[CLS] and pooled, shapes (V, D)."""
+MEMBERS = """
+    SELECT i.rowid AS place, i.id, i.category_id FROM instances i INDEXED BY instances_living
+    WHERE i.removed_by IS NULL AND i.category_id NOT IN (SELECT id FROM categories WHERE removed_by IS NOT NULL)
+"""
+"""From an index alone: a row is long, and what is asked for lies behind its tokens."""
+AT_ONCE = 500
+"""Rows read in one go; bounds memory at about 100 MB."""
 log = logging.getLogger("onelook.store")
 
 
@@ -41,6 +53,11 @@ class Instances:
         self._connection = connection
         self._tokens: dict[str, Tokens | None] = {}
         """By instance; None for damaged ones, which are told of once."""
+        self._listed: tuple[str, list[Listed]] = ("", [])
+        """As of a version of the members."""
+        self._told: set[str] = set()
+        """Damaged ones that were told of."""
+        self._enrolled: Enrolled | None = None
 
     def of(self, category_id: str) -> list[Instance]:
         """Those of a category, oldest first."""
@@ -73,27 +90,74 @@ class Instances:
             if is_empty(db, category_id):
                 raise Conflict(f"instance {instance_id!r} is the last of category {category_id!r}; delete the category instead")
 
+    def enrolled(self, whitening: Whitening | None) -> Enrolled:
+        """The same from one call to the next, which the decisions of the score `best` are made by; reads what they need, as they need it.
+
+        `whitening` is that of the memory's one backbone.
+        """
+        if self._enrolled is None:
+            self._enrolled = Enrolled(self, whitening)
+        return self._enrolled
+
     def members(self) -> list[Member]:
-        """Tokens of every instance, oldest first. A damaged one is left out, so that the others go on being recognised."""
-        rows = self._connection.rows(f"SELECT i.id, i.category_id {LIVING} ORDER BY i.rowid")
-        tokens = self._load({row["id"] for row in rows})
-        return [Member(row["category_id"], *found) for row in rows if (found := tokens.get(row["id"])) is not None]
+        """[CLS] and pooled tokens of every instance, oldest first. A damaged one is left out, so that the others go on being recognised."""
+        listed = self.listed()
+        tokens = self._load({member.id for member in listed})
+        return [Member(member.category_id, *found) for member in listed if (found := tokens.get(member.id)) is not None]
+
+    def listed(self) -> list[Listed]:
+        """Every instance and its category, oldest first; the same object while nothing has changed."""
+        (version,) = self._connection.rows("SELECT value FROM meta WHERE key = 'members_version'")
+        if self._listed[0] != version["value"]:
+            rows = sorted(self._connection.rows(MEMBERS), key=lambda row: int(row["place"]))
+            self._listed = version["value"], [Listed(row["id"], row["category_id"]) for row in rows]
+        return self._listed[1]
+
+    def pooled_means(self, ids: Sequence[str]) -> dict[str, Array]:
+        """Means over views of pooled tokens, shape (D,), without instances that have no patches; nothing behind these tokens is read."""
+        found = {}
+        for row in self._rows(ids, "id, views, pooled, typeof(patches) AS patches"):
+            if row["patches"] != "null":
+                mean = from_blob(row["pooled"], row["views"]).mean(axis=0)
+                if np.isfinite(mean).all():
+                    found[row["id"]] = mean
+                else:
+                    self._tell(row["id"])
+        return found
+
+    def patches(self, ids: Sequence[str]) -> dict[str, Array]:
+        """Patches, shape (V, K, D), of those that have any and are not damaged."""
+        found = {}
+        for row in self._rows(ids, f"id, views, {', '.join(TOKENS)}, tokens_sha256"):
+            if damaged(row):
+                self._tell(row["id"])
+            elif row["patches"] is not None:
+                found[row["id"]] = patches_from_blob(row["patches"], row["views"], len(row["cls"]) // BLOB_TYPE.itemsize // row["views"])
+        return found
 
     def reload(self) -> None:
         """Reads all tokens anew: they were computed again."""
-        self._tokens = {}
+        self._tokens, self._enrolled = {}, None
 
     def _load(self, wanted: set[str]) -> dict[str, Tokens | None]:
         """Tokens by instance; what was read once stays in memory."""
         kept = {each: tokens for each, tokens in self._tokens.items() if each in wanted}
-        new = json.dumps(sorted(wanted - kept.keys()))
-        query = f"SELECT id, views, {', '.join(TOKENS)}, tokens_sha256 FROM instances WHERE id IN (SELECT value FROM json_each(?))"
-        for row in self._connection.rows(query, new):
-            kept[row["id"]] = None if damaged(row) else _tokens(row)
+        for row in self._rows(sorted(wanted - kept.keys()), f"id, views, {', '.join(TOKENS)}, tokens_sha256"):
+            kept[row["id"]] = None if damaged(row) else (from_blob(row["cls"], row["views"]), from_blob(row["pooled"], row["views"]))
             if kept[row["id"]] is None:
-                log.warning("the tokens of instance %s are damaged and left out; `onelook memory check` says more", row["id"])
+                self._tell(row["id"])
         self._tokens = kept
         return kept
+
+    def _rows(self, ids: Sequence[str], columns: str) -> Iterator[Row]:
+        for start in range(0, len(ids), AT_ONCE):
+            named = json.dumps(list(ids[start : start + AT_ONCE]))
+            yield from self._connection.rows(f"SELECT {columns} FROM instances WHERE id IN (SELECT value FROM json_each(?))", named)
+
+    def _tell(self, instance_id: str) -> None:
+        if instance_id not in self._told:
+            self._told.add(instance_id)
+            log.warning("the tokens of instance %s are damaged and left out; `onelook memory check` says more", instance_id)
 
 
 def damaged(row: Row) -> bool:
@@ -104,11 +168,6 @@ def damaged(row: Row) -> bool:
 def tokens_sha256(row: Row) -> str:
     """Checksum of an instance's tokens, which are BLOBs."""
     return hashlib.sha256(b"".join(row[name] or b"" for name in TOKENS)).hexdigest()
-
-
-def _tokens(row: Row) -> Tokens:
-    cls, pooled = (from_blob(row[name], row["views"]) for name in ("cls", "pooled"))
-    return cls, pooled, None if row["patches"] is None else patches_from_blob(row["patches"], *cls.shape)
 
 
 def token_columns(encoded: EncodedBurst) -> Row:

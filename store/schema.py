@@ -238,5 +238,22 @@ def m006_corrections(db: Database) -> None:
         db.table(table).create_index([column])
 
 
+@migrations()
+def m007_members(db: Database) -> None:
+    """Which bursts are members of which category is read from an index alone, and only where it may have changed."""
+    db.execute("CREATE INDEX instances_living ON instances (removed_by, category_id, id)")
+    db.execute("INSERT INTO meta (key, value) VALUES ('members_version', '0')")
+    for table, happens in (
+        ("instances", "INSERT"),
+        ("instances", "DELETE"),
+        ("instances", "UPDATE OF category_id, removed_by, cls, pooled, patches"),
+        ("categories", "DELETE"),
+        ("categories", "UPDATE OF removed_by"),
+    ):
+        name = f"{table}_{happens.split()[0].lower()}"
+        change = "UPDATE meta SET value = value + 1 WHERE key = 'members_version'"
+        db.execute(f"CREATE TRIGGER {name} AFTER {happens} ON {table} BEGIN {change}; END")
+
+
 def _reference(table: str, column: str, other_table: str, on_delete: str) -> ForeignKey:
     return ForeignKey(table, column, other_table, "id", on_delete=on_delete)

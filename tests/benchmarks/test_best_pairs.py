@@ -51,7 +51,7 @@ def test_evidence_is_the_service_s(pairs: BestPairs, patches: list[torch.Tensor]
     used = filled(source)
     categories, evidence = source.ranked(target, used, np.array([without]))
     entries = [Entry(str(category), patches[burst]) for burst, category in enumerate(CHOSEN)]
-    expected = Comparison(entries, patches[target], PRIOR.cohort).ranked(str(without) if without >= 0 else None)
+    expected = Comparison.between(patches[target], entries, PRIOR.cohort).ranked(str(without) if without >= 0 else None)
     assert [str(each) for each in categories[0]] == [category for category, _ in expected]
     np.testing.assert_allclose(evidence[0], [value for _, value in expected], atol=1e-5)
 

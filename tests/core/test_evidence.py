@@ -64,7 +64,7 @@ def test_what_resembles_everything_is_no_evidence() -> None:
     """A hub matches the burst best of all, but matches every other category as well."""
     everything = views([0, 1, 2, 3, 4, 5])
     entries = [Entry("hub", everything), *(Entry(f"{axis}", views([axis] * 6)) for axis in range(6))]
-    ranked = Comparison(entries, views([0, 0, 0, 0, 0, 1]), cohort_prior=0.0).ranked()
+    ranked = Comparison.between(views([0, 0, 0, 0, 0, 1]), entries, 0.0).ranked()
     assert ranked[0][0] == "0"
     assert dict(ranked)["0"] > dict(ranked)["hub"]
 
@@ -72,7 +72,7 @@ def test_what_resembles_everything_is_no_evidence() -> None:
 def test_a_category_left_out_is_as_if_it_were_not_there() -> None:
     entries = [Entry(f"{axis}", views([axis, (axis + 1) % 6])) for axis in range(4)]
     asked = views([0, 1])
-    assert Comparison(entries, asked, 0.2).ranked(without="0") == Comparison(entries[1:], asked, 0.2).ranked()
+    assert Comparison.between(asked, entries, 0.2).ranked(without="0") == Comparison.between(asked, entries[1:], 0.2).ranked()
 
 
 def test_patches_are_drawn_the_same_way_every_time_from_views_that_show_something(painted: PaintedObject) -> None:

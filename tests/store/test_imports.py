@@ -243,7 +243,8 @@ def test_an_archive_of_an_earlier_version_brings_what_decisions_compare_now(
         manifest["categories"][0]["instances"][0]["tokens_sha256"] = FileSum.of(blobs).sha256
 
     second.import_archive(packed(tmp_path / "earlier.zip", with_manifest(with_entry(entries, name, npz(**tokens)), tell)))
-    assert np.array_equal(second.categories.members()[0].patches, sample_patches(encoded))
+    (first, *_) = second.instances.listed()
+    assert np.array_equal(second.instances.patches([first.id])[first.id], sample_patches(encoded))
     assert second.check().ok
 
 

@@ -56,9 +56,9 @@ def test_what_was_learnt_is_still_known(upgraded: Memory, cup: Category, referen
 
 
 def test_tokens_that_decisions_compare_now_are_drawn_from_its_arrays(upgraded: Memory, encoded: EncodedBurst) -> None:
-    by_scan, by_observation = upgraded.categories.members()
-    assert np.array_equal(by_scan.patches, sample_patches(encoded))
-    assert by_observation.patches is None  # its features were no burst's
+    by_scan, by_observation = (each.id for each in upgraded.instances.listed())
+    assert list(upgraded.instances.pooled_means([by_scan, by_observation])) == [by_scan]  # the other's features were no burst's
+    assert np.array_equal(upgraded.instances.patches([by_scan])[by_scan], sample_patches(encoded))
     assert upgraded.check().ok
 
 

@@ -1,0 +1,212 @@
+"""The members of a memory, kept ready from decision to decision: one takes the time of a few comparisons, however many members there are.
+
+Up to EXACT members each is compared patch by patch, which is the rule (`core.evidence.Comparison.between`); what does not depend on the
+burst is computed once. Of a larger memory the burst is compared with the mean pooled token of every member first, and patch by patch with
+the nearest members and the founders of the nearest categories alone; a member's cohort is made of the founders nearest to it.
+
+Letters: V views, K patches a view, D token size.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import OrderedDict
+from collections.abc import Mapping, Sequence
+from typing import Protocol, TypeVar
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from core.backbones.whitening import Whitening
+from core.encode import EncodedBurst
+from core.evidence import Adaptation, Comparison, best_matching, match_views, sample_patches, whitened
+from core.nearness import Listed, Nearness
+
+FloatArray = NDArray[np.floating]
+T = TypeVar("T")
+
+EXACT = 64
+"""Members up to which every one is compared patch by patch: about 25 ms on two cores with ten views a side."""
+NEAREST = 16
+"""Members, and founders of categories, that are compared patch by patch in a larger memory."""
+ADAPTED_FROM = 256
+"""Members, evenly spaced, whose patches a larger memory is adapted to; more say nothing new."""
+GROWTH = 1.25
+"""Factor by which a larger memory grows until it is adapted anew, which all comparisons kept so far are lost by."""
+KEPT = 256
+"""Members whose patches stay in memory, those compared last: about 100 MB of ten views each."""
+KEPT_COHORTS = 4096
+"""Members whose matches with founders stay in memory: about 10 MB."""
+
+
+class Source(Protocol):
+    """Where the tokens are; none are asked for that no decision needs."""
+
+    def listed(self) -> Sequence[Listed]:
+        """All members, oldest first; the same object while nothing has changed."""
+
+    def pooled_means(self, ids: Sequence[str]) -> Mapping[str, FloatArray]:
+        """By id, the mean over views of a member's pooled tokens, shape (D,); without those that have no patches, or are damaged."""
+
+    def patches(self, ids: Sequence[str]) -> Mapping[str, FloatArray]:
+        """By id, of `core.evidence.sample_patches`, shape (V, K, D); without those that are damaged."""
+
+
+class Enrolled:
+    """See module. Safe to use from several threads."""
+
+    def __init__(self, source: Source, whitening: Whitening | None) -> None:
+        self._source, self._whitening = source, whitening
+        self._lock = threading.Lock()
+        self._listed: Sequence[Listed] = ()
+        self._left_out: set[str] = set()
+        """Damaged ones."""
+        self._near = Nearness()
+        self._adapted_to: list[str] = []
+        self._matrix, self._offset = torch.zeros(0, 0), torch.zeros(0)
+        self._patches: _Latest[Tensor] = _Latest(KEPT)
+        self._cohorts: _Latest[dict[str, float]] = _Latest(KEPT_COHORTS)
+        """By member, its matches with founders, by the founder's id."""
+        self._neighbours: dict[int, list[int]] = {}
+        """By member, the founders that its cohort is made of; while nothing changes."""
+
+    def compare(self, target: EncodedBurst, prior: float) -> Comparison | None:
+        """A burst with all members, or the nearest; None where there is none. `prior` as of `Comparison`."""
+        with self._lock:
+            self._update(self._source.listed())
+            while len(self._near):
+                try:
+                    return self._compare(target, prior)
+                except _DamagedError as error:
+                    self._left_out |= error.ids
+                    self._enrol()
+            return None
+
+    @property
+    def exact(self) -> bool:
+        """Whether every member is compared patch by patch."""
+        return len(self._near) <= EXACT
+
+    def _update(self, listed: Sequence[Listed]) -> None:
+        if listed is not self._listed:
+            self._listed = listed
+            self._enrol()
+
+    def _enrol(self) -> None:
+        self._near.update([member for member in self._listed if member.id not in self._left_out], self._source.pooled_means)
+        self._neighbours.clear()
+
+    def _compare(self, target: EncodedBurst, prior: float) -> Comparison:
+        self._adapt()
+        near, members = self._near, self._near.members
+        if self.exact:
+            chosen = list(range(len(near)))
+        else:
+            ((closest, founders),) = near.nearest(target.pooled.mean(axis=0)[None], NEAREST)
+            chosen = sorted({*closest, *founders})
+        found = match_views(self._directions([sample_patches(target)])[0], self._prepared(chosen))
+        best: dict[str, int] = {}
+        matches: dict[str, float] = {}
+        of_founders: dict[str, float] = {}
+        for place, match in zip(chosen, found.tolist()):
+            category = members[place].category_id
+            if match > matches.get(category, -np.inf):
+                matches[category], best[category] = match, place
+            if near.founders[category] == place:
+                of_founders[category] = match
+        asked = best_matching(matches)
+        cohorts = dict(zip(asked, self._cohorts_of([best[category] for category in asked])))
+        return Comparison(matches, of_founders, cohorts, prior)
+
+    def _cohorts_of(self, places: Sequence[int]) -> list[dict[str, float]]:
+        """For each of some members its matches with founders, by category."""
+        return [self._cohort(place, founders) for place, founders in zip(places, self._founders_near(places))]
+
+    def _cohort(self, place: int, founders: Sequence[int]) -> dict[str, float]:
+        members = self._near.members
+        known = self._cohorts.keep(members[place].id, self._cohorts.get(members[place].id, {}))
+        missing = [each for each in founders if members[each].id not in known]
+        (own,) = self._prepared([place])
+        known.update(zip((members[each].id for each in missing), match_views(own, self._prepared(missing)).tolist()))
+        return {members[each].category_id: known[members[each].id] for each in founders}
+
+    def _founders_near(self, places: Sequence[int]) -> list[list[int]]:
+        if self.exact:
+            return [list(self._near.founders.values())] * len(places)
+        missing = [place for place in places if place not in self._neighbours]
+        if missing:
+            found = self._near.nearest(self._near.vectors(missing), NEAREST + 1)
+            self._neighbours.update(zip(missing, (founders for _, founders in found)))
+        return [self._neighbours[place] for place in places]
+
+    def _prepared(self, places: Sequence[int]) -> list[Tensor]:
+        """Unit patches of some members, adapted to the memory. Raises _DamagedError."""
+        ids = [self._near.members[place].id for place in places]
+        there = {each: self._patches[each] for each in ids if each in self._patches}
+        missing = [each for each in ids if each not in there]
+        if missing:
+            read = self._read(missing)
+            there.update(zip(missing, self._directions([read[each] for each in missing])))
+        return [self._patches.keep(each, there[each]) for each in ids]
+
+    def _read(self, ids: Sequence[str]) -> Mapping[str, FloatArray]:
+        read = self._source.patches(ids) if ids else {}
+        damaged = {each for each in ids if each not in read}
+        if damaged:
+            raise _DamagedError(damaged)
+        return read
+
+    def _directions(self, bursts: Sequence[FloatArray]) -> list[Tensor]:
+        """`whitened` and `Adaptation.directions` in one product."""
+        tokens = torch.from_numpy(np.concatenate(bursts).astype(np.float32))
+        adapted = torch.nn.functional.normalize(tokens @ self._matrix + self._offset, dim=-1)
+        return list(torch.split(adapted, [len(burst) for burst in bursts]))
+
+    def _adapt(self) -> None:
+        """To all members of a small memory, at each change; to some of a larger one, after each quarter that it has grown by."""
+        wanted = [self._near.members[place].id for place in adapted_from(len(self._near))]
+        if wanted == self._adapted_to:
+            return
+        read = self._read(wanted)
+        adaptation = Adaptation.fit([whitened(read[each], self._whitening) for each in wanted])
+        matrix, offset = adaptation.matrix, -adaptation.mean @ adaptation.matrix
+        if self._whitening is not None:
+            shipped = self._whitening.matrix.astype(np.float64)
+            matrix, offset = shipped @ matrix, offset - (self._whitening.mean @ shipped) @ adaptation.matrix
+        self._matrix, self._offset = torch.from_numpy(matrix).float(), torch.from_numpy(offset).float()
+        self._patches.clear()
+        self._cohorts.clear()
+        self._adapted_to = wanted
+
+
+class _DamagedError(Exception):
+    def __init__(self, ids: set[str]) -> None:
+        super().__init__(f"{len(ids)} members are damaged")
+        self.ids = ids
+
+
+class _Latest(OrderedDict[str, T]):
+    """What was kept last."""
+
+    def __init__(self, most: int) -> None:
+        super().__init__()
+        self._most = most
+
+    def keep(self, key: str, value: T) -> T:
+        """Keeps it as the latest, and returns it."""
+        self[key] = value
+        self.move_to_end(key)
+        while len(self) > self._most:
+            self.popitem(last=False)
+        return value
+
+
+def adapted_from(count: int) -> list[int]:
+    """Places of the members that a memory of so many is adapted to: the same ones until it has grown by GROWTH."""
+    if count <= EXACT:
+        return list(range(count))
+    steps = int(np.floor(np.log(count / EXACT) / np.log(GROWTH) + 1e-9))
+    size = min(count, int(np.ceil(EXACT * GROWTH**steps)))
+    return np.unique(np.linspace(0, size - 1, min(size, ADAPTED_FROM)).astype(int)).tolist()
