@@ -108,6 +108,25 @@ def speed(
 
 
 @app.command()
+def growth(
+    categories: Annotated[list[int], typer.Option(help="Sizes of the memory, growing; may be repeated.")] = [10, 100, 1000, 10_000],  # noqa: B006
+    views: Annotated[int, typer.Option(min=1, help="Of what is learnt and of what is looked at.")] = 10,
+    rounds: Annotated[int, typer.Option(min=2, help="Decisions timed at each size.")] = 40,
+    exact_up_to: Annotated[int, typer.Option(min=0, help="Categories up to which the exact rule is computed too.")] = 1000,
+    data: Samples = None,
+    backbone: Backbone = BACKBONE,
+    seed: Seed = 0,
+    plot: Plot = None,
+    json: JsonFile = None,
+) -> None:
+    """Time of a decision, of a start, and memory, as a memory grows to many categories."""
+    from benchmarks.growth import run
+    from clients.cli.grown import fill, measure
+
+    run(fill, measure, json, plot, categories, views, rounds, exact_up_to, data, backbone, seed)
+
+
+@app.command()
 def rendering(
     category: Categories = None,
     frames: Annotated[int, typer.Option(min=1, help="Frames of each object.")] = 12,

@@ -1,0 +1,153 @@
+"""Growth: what a decision, a start and the memory take as categories come, from ten to a hundred thousand.
+
+The store is a real one: rows as the service writes them, without pictures and references, which a decision by tokens does not read. It
+grows from size to size, and at each a new process opens it and decides as the service does. The tokens are `benchmarks.synthetic_tokens`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from benchmarks.encoded import encode_all, read_views
+from benchmarks.growth_plot import plot_growth
+from benchmarks.parallel import bar
+from benchmarks.synthetic_tokens import Levels, SyntheticTokens
+from benchmarks.tables import print_table, write_json
+from clients.datasets.samples import data_or_samples
+from clients.datasets.sources import find_sequences
+from core.backbones.dino import load_backbone
+from core.encode import EncodedBurst, Encoder
+from core.errors import InvalidInput
+
+ASKED = 1
+"""Instance of a category that is looked at; the one that the memory holds is 0."""
+
+
+@dataclass(frozen=True, eq=False)
+class Probe:
+    """What is measured in a process of its own, on the memory as it is."""
+
+    folder: Path
+    known: Sequence[EncodedBurst]
+    """Of categories that the memory holds."""
+    right: Sequence[int]
+    """Which categories these are, counted from the first learnt."""
+    novel: EncodedBurst
+    """Of none; the memory learns it in the end."""
+    rounds: int
+    exact: bool
+    """Whether the exact rule is computed too, which compares each burst with all members patch by patch."""
+
+
+@dataclass(frozen=True)
+class GrowthRow:
+    """One size of the memory."""
+
+    categories: int
+    exact: bool
+    """Whether the service compares every member patch by patch at this size."""
+    decide_ms: float
+    p95_ms: float
+    """A decision on an object that was decided on before."""
+    nearest_ms: float
+    """Of it, the product with all pooled means."""
+    store_ms: float
+    """Of it, what is asked of the store: whether members have changed, and the latest decisions."""
+    new_ms: float
+    """A decision on an object whose like was not looked at since the start: its neighbours are read."""
+    learnt_ms: float
+    """The first decision after a category was learnt."""
+    first_ms: float
+    """The first decision after the start."""
+    open_ms: float
+    """Until the memory is open."""
+    open_read_mb: float
+    first_read_mb: float
+    """Read from files by then, and by the first decision."""
+    file_mb: float
+    """Of tokens and rows on the disk."""
+    resident_mb: float
+    """After all decisions, beyond a process that has no memory open."""
+    right: float
+    """Decisions whose most similar category is the right one."""
+    recall: float | None
+    """Decisions for which the exact rule finds the same category most similar."""
+    evidence_off: float | None
+    """Mean distance of its similarity from the exact one."""
+    exact_spread: float | None
+    """Standard deviation of the exact similarities, to compare with."""
+
+
+COLUMNS = tuple(field.name for field in fields(GrowthRow))
+Fill = Callable[[Path, Iterable[EncodedBurst]], None]
+"""Adds a category for each burst to the memory in a folder, which is made where it is missing."""
+Measure = Callable[[Probe], GrowthRow]
+
+
+def run(
+    fill: Fill,
+    measure: Measure,
+    json: Path | None,
+    plot: Path | None = None,
+    categories: Sequence[int] = (10, 100, 1000, 10_000),
+    views: int = 10,
+    rounds: int = 40,
+    exact_up_to: int = 1000,
+    data: Path | None = None,
+    backbone: str = "dinov2-s14",
+    seed: int = 0,
+) -> list[GrowthRow]:
+    """A row for each size; prints a table.
+
+    Args:
+        fill: how a memory is filled, and `measure` how one is asked: both are the store's business, and this package knows no store.
+        rounds: decisions timed at each size.
+        exact_up_to: categories up to which the exact rule is computed as well, in time that grows with their number.
+
+    Raises InvalidInput where sizes do not grow, or the backbone ships no statistics.
+    """
+    if list(categories) != sorted(set(categories)) or categories[0] < 1:
+        raise InvalidInput("categories", f"expected growing numbers, found {', '.join(map(str, categories))}")
+    tokens, recorded, synthetic = synthetic_tokens(data, backbone, seed)
+    rng, rows, before = np.random.default_rng(seed), [], 0
+    with TemporaryDirectory() as folder, bar() as progress:
+        task = progress.add_task("learning", total=sum(np.diff([0, *categories])))
+        for count in categories:
+            progress.update(task, description=f"{count} categories")
+            fill(Path(folder), (_told(tokens, each, views, lambda: progress.advance(task)) for each in range(before, count)))
+            right = rng.integers(0, count, rounds).tolist()
+            asked = [tokens.burst(category, ASKED, views) for category in right]
+            rows.append(measure(Probe(Path(folder), asked, right, tokens.burst(10**9 + count, ASKED, views), rounds, count <= exact_up_to)))
+            before = count
+    if json is not None:
+        meta = {"benchmark": "growth", "views": views, "rounds": rounds, "seed": seed}
+        write_json(json, meta | {"recorded": asdict(recorded), "synthetic": asdict(synthetic)}, [asdict(row) for row in rows])
+    if plot is not None:
+        plot_growth(plot, rows, f"{views} views a burst, one burst a category")
+    print_table("How well bursts match", [{"bursts": "recorded", **asdict(recorded)}, {"bursts": "synthetic", **asdict(synthetic)}], LEVELS)
+    print_table(f"Growth, {views} views a burst, {rounds} decisions", [asdict(row) for row in rows], COLUMNS)
+    return rows
+
+
+LEVELS = ("bursts", *(field.name for field in fields(Levels)))
+
+
+def synthetic_tokens(data: Path | None, backbone: str, seed: int) -> tuple[SyntheticTokens, Levels, Levels]:
+    """Like the bursts of `data`, the samples where None; and how bursts match, recorded and synthetic."""
+    network = load_backbone(backbone)
+    if network.whitening is None:
+        raise InvalidInput("backbone", f"{backbone} ships no statistics of its tokens to draw from; take dinov2-s14")
+    sequences = find_sequences(data_or_samples(data))
+    files = encode_all(sequences, Encoder(network))
+    recorded = [(sequence.category, read_views(file)) for sequence, file in zip(sequences, files)]
+    return SyntheticTokens.like(recorded, network.whitening, seed)
+
+
+def _told(tokens: SyntheticTokens, category: int, views: int, tell: Callable[[], None]) -> EncodedBurst:
+    tell()
+    return tokens.burst(category, 0, views)

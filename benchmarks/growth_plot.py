@@ -1,0 +1,50 @@
+"""The picture of growth."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import matplotlib
+
+if TYPE_CHECKING:
+    from benchmarks.growth import GrowthRow
+
+SIZE = (12, 3.8)
+DPI = 110
+TARGET_MS = 10.0
+"""A decision at 10,000 categories."""
+
+
+def plot_growth(file: Path, rows: Sequence[GrowthRow], title: str) -> None:
+    """Against the number of categories: milliseconds of a decision, megabytes, and milliseconds of a start."""
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+
+    figure, (decision, memory, start) = pyplot.subplots(1, 3, figsize=SIZE, constrained_layout=True)
+    sizes = [row.categories for row in rows]
+    for name, label in (
+        ("decide_ms", "a decision"),
+        ("nearest_ms", "of it: nearest of all"),
+        ("store_ms", "of it: the store"),
+        ("new_ms", "neighbours not read yet"),
+        ("learnt_ms", "after a category was learnt"),
+    ):
+        decision.plot(sizes, [getattr(row, name) for row in rows], "o-", label=label)
+    decision.axhline(TARGET_MS, color="grey", linestyle=":", label=f"{TARGET_MS:.0f} ms")
+    decision.set(ylabel="ms", yscale="log")
+    megabytes = (("file_mb", "rows and tokens on the disk"), ("first_read_mb", "read by the first decision"), ("resident_mb", "resident"))
+    for name, label in megabytes:
+        memory.plot(sizes, [getattr(row, name) for row in rows], "o-", label=label)
+    memory.set(ylabel="MB", yscale="log")
+    for name, label in (("open_ms", "the memory is open"), ("first_ms", "the first decision takes")):
+        start.plot(sizes, [getattr(row, name) for row in rows], "o-", label=label)
+    start.set(ylabel="ms", yscale="log")
+    for panel in (decision, memory, start):
+        panel.set(xlabel="categories", xscale="log")
+        panel.legend(fontsize=8)
+    file.parent.mkdir(parents=True, exist_ok=True)
+    figure.suptitle(title, fontsize=10)
+    figure.savefig(file, dpi=DPI)
+    pyplot.close(figure)

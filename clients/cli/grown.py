@@ -1,0 +1,202 @@
+"""What `onelook bench growth` asks of a store: filled with categories that are tokens only, and decided on in a process of its own."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any, TypeVar
+
+if TYPE_CHECKING:
+    from benchmarks.growth import GrowthRow, Probe
+    from core.encode import EncodedBurst
+    from core.novelty import Decision
+    from store.memory import Memory
+
+T = TypeVar("T")
+AT_ONCE = 500
+"""Categories in one transaction, and members compared in one go."""
+PAST = 300
+"""Decisions that the memory has behind it: as many as the service calibrates by."""
+MEGABYTE = 1e6
+
+
+def fill(folder: Path, bursts: Iterable[EncodedBurst]) -> None:
+    """Adds a category for each burst; a new memory gets a past too."""
+    from store.memory import Memory
+
+    with Memory.open(folder) as memory:
+        if not memory.categories.all():
+            _live_through(memory)
+    several: list[EncodedBurst] = []
+    for burst in bursts:
+        several.append(burst)
+        if len(several) == AT_ONCE:
+            _insert(folder, several)
+            several = []
+    _insert(folder, several)
+
+
+def measure(probe: Probe) -> GrowthRow:
+    """In a process of its own, so that what is resident is this memory's."""
+    from concurrent.futures import ProcessPoolExecutor
+    from multiprocessing import get_context
+
+    with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
+        return pool.submit(_measure, probe).result()
+
+
+def _measure(probe: Probe) -> GrowthRow:
+    import numpy as np
+
+    from benchmarks.growth import GrowthRow
+    from core.backbones.whitening import Whitening
+    from core.enrolled import NEAREST
+    from service.judgement import Judge
+    from store.memory import Memory
+
+    whitening = Whitening.shipped("dinov2-s14")
+
+    def decide(memory: Memory, burst: EncodedBurst) -> Decision:
+        from core.novelty import DecisionConfig
+
+        return Judge(memory, burst, whitening).judge(DecisionConfig()).decision
+
+    with TemporaryDirectory() as folder, Memory.open(Path(folder)) as empty:  # loads what any decision needs
+        _insert(Path(folder), [probe.novel])
+        decide(empty, probe.novel)
+    resident, read = _resident_mb(), _read_mb()
+    opening, memory = _timed(lambda: Memory.open(probe.folder))
+    with memory:
+        opened = _read_mb()
+        first, _ = _timed(lambda: decide(memory, probe.known[0]))
+        first_read = _read_mb()
+        fresh = [_timed(partial(decide, memory, burst))[0] for burst in probe.known[1:]]
+        again = [_timed(partial(decide, memory, burst)) for burst in probe.known]
+        store = [_timed(lambda: (memory.instances.listed(), memory.observations.decisions(PAST)))[0] for _ in probe.known]
+        after = _resident_mb()
+        members = memory.instances.listed()
+        near = _nearness(memory)
+        nearest = [_timed(partial(near.nearest, burst.pooled.mean(axis=0)[None], NEAREST))[0] for burst in probe.known]
+        decisions = [decision for _, decision in again]
+        names = [members[category].category_id for category in probe.right]
+        exact = _exact(memory, probe, whitening) if probe.exact else None
+        few = memory.categories.enrolled(whitening).exact
+        _insert(probe.folder, [probe.novel])
+        learnt, _ = _timed(lambda: decide(memory, probe.known[-1]))
+    times = [seconds for seconds, _ in again]
+    return GrowthRow(
+        categories=len(members),
+        exact=few,
+        decide_ms=float(np.median(times)),
+        p95_ms=float(np.percentile(times, 95)),
+        nearest_ms=float(np.median(nearest)),
+        store_ms=float(np.median(store)),
+        new_ms=float(np.median(fresh)),
+        learnt_ms=learnt,
+        first_ms=first,
+        open_ms=opening,
+        open_read_mb=opened - read,
+        first_read_mb=first_read - read,
+        file_mb=sum(file.stat().st_size for file in probe.folder.glob("memory.sqlite3*")) / MEGABYTE,
+        resident_mb=after - resident,
+        right=float(np.mean([decision.similarities[0][0] == name for decision, name in zip(decisions, names)])),
+        recall=None if exact is None else float(np.mean([d.similarities[0][0] == e[0] for d, e in zip(decisions, exact)])),
+        evidence_off=None if exact is None else float(np.mean([abs(d.similarities[0][1] - e[1]) for d, e in zip(decisions, exact)])),
+        exact_spread=None if exact is None else float(np.std([similarity for _, similarity in exact])),
+    )
+
+
+def _exact(memory: Memory, probe: Probe, whitening: Any) -> list[tuple[str, float]]:
+    """The most similar category and its similarity, with every member compared patch by patch."""
+    from core.calibration import Prior
+    from core.enrolled import adapted_from
+    from core.evidence import Adaptation, Comparison, best_matching, match_views, sample_patches, whitened
+
+    members = memory.instances.listed()
+    sample = [members[place].id for place in adapted_from(len(members))]
+    read = memory.instances.patches(sample)
+    adaptation = Adaptation.fit([whitened(read[each], whitening) for each in sample])
+    targets = [adaptation.directions(whitened(sample_patches(burst), whitening)) for burst in probe.known]
+
+    def with_all(asked: Sequence[Any]) -> list[dict[str, float]]:
+        found: list[dict[str, float]] = [{} for _ in asked]
+        for start in range(0, len(members), AT_ONCE):
+            part = members[start : start + AT_ONCE]
+            patches = memory.instances.patches([each.id for each in part])
+            directions = [adaptation.directions(whitened(patches[each.id], whitening)) for each in part]
+            for each, matches in zip(asked, found):
+                matches.update(zip((member.category_id for member in part), match_views(each, directions).tolist()))
+        return found
+
+    own = {member.category_id: member.id for member in members}
+    matched = with_all(targets)
+    wanted = sorted({category for matches in matched for category in best_matching(matches)})
+    patches = memory.instances.patches([own[category] for category in wanted])
+    between = with_all([adaptation.directions(whitened(patches[own[category]], whitening)) for category in wanted])
+    cohorts = dict(zip(wanted, between))
+    return [Comparison(matches, matches, cohorts, Prior.shipped().cohort).ranked()[0] for matches in matched]
+
+
+def _nearness(memory: Memory) -> Any:
+    from core.nearness import Nearness
+
+    near = Nearness()
+    near.update(memory.instances.listed(), memory.instances.pooled_means)
+    return near
+
+
+def _insert(folder: Path, bursts: Sequence[EncodedBurst]) -> None:
+    """Categories as the store writes their rows, whose references and pictures are nowhere."""
+    from store.connection import Connection, new_id
+    from store.instances import insert_instance
+    from store.retention import now
+
+    connection = Connection(folder)
+    try:
+        with connection.change() as db:
+            for burst in bursts:
+                category_id = new_id()
+                row = {"id": category_id, "origin_id": category_id, "created_at": now(), "views": len(burst.views)}
+                db.table("categories").insert(row | {"extent_m": "[1,1,1]", "reference_sha256": "", "files": "{}"})
+                insert_instance(db, category_id, burst, source="scan", source_id=None, how="scan")
+    finally:
+        connection.close()
+
+
+def _live_through(memory: Memory) -> None:
+    """Decisions to be calibrated by, on an object as small as can be."""
+    import numpy as np
+
+    from core.novelty import BEST, Decision
+    from core.views import Burst, View
+    from store.observations import Answer
+
+    seen = Burst([View(np.zeros((32, 32, 3), np.uint8))])
+    for number in range(PAST):
+        similarities = tuple((f"{number:032x}", 0.01 * place) for place in range(5, 0, -1))
+        decision = Decision("novel", BEST, 0.2, similarities, 0.1, 0.3, 0.5, rival=0.05)
+        memory.observations.create(Answer("novel", None, None, decision, None, None, None, {}), seen, {"none": np.zeros(1)})
+
+
+def _timed(work: Callable[[], T]) -> tuple[float, T]:
+    """Milliseconds, and what came of it."""
+    started = time.perf_counter()
+    done = work()
+    return 1000 * (time.perf_counter() - started), done
+
+
+def _resident_mb() -> float:
+    return _field(Path("/proc/self/status"), "VmRSS:") * 1024 / MEGABYTE
+
+
+def _read_mb() -> float:
+    """Bytes asked of files, also where the system has them in its cache."""
+    return _field(Path("/proc/self/io"), "rchar:") / MEGABYTE
+
+
+def _field(file: Path, name: str) -> int:
+    lines: Iterator[str] = (line for line in file.read_text().splitlines() if line.startswith(name))
+    return int(next(lines).split()[1])
