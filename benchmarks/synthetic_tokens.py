@@ -3,18 +3,21 @@
 In whitened coordinates a patch is the sum of its category, its instance, its view, the part of the object that it shows, and noise. The
 variances of the first three and the covariance of patches within a view are those of recorded bursts; categories and instances differ
 along the directions in which the shipped statistics say that tokens vary. A category has PARTS parts, of which a view shows the half that
-faces it. How much of a part is the category's and not the instance's own is chosen such that bursts of one category match each other as
-well as those recorded do; how well others match then follows, and is printed beside what was recorded.
+faces it, and is kin to the others of its family of FAMILY. Two figures are chosen such that bursts match as those recorded do: how much of
+a part is the category's and not the instance's own, by how well bursts of one category match, and how much of a category is its family's,
+by how much it differs between pairs of categories how well these match. How well different categories match on average then follows, and is
+printed beside what was recorded.
 
 Letters: V views, K patches of a view, D token size.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from core.backbones.whitening import SHRINKAGE, Whitening
 from core.crop import Window
@@ -25,10 +28,14 @@ from core.views import FloatArray
 PARTS = 48
 NOISE = 0.3
 """Share of the variance of patches within a view that no other view shows again."""
-TRIED = 8
-"""Categories, of two instances each, that the share of a part is chosen with."""
-STEPS = 6
-"""Of that choice; each halves what is left open."""
+TRIED = 12
+"""Categories, of two instances each, that both are chosen with."""
+STEPS = 5
+"""Of a choice; each halves what is left open."""
+TURNS = 2
+"""Each is chosen so often, since one moves the other."""
+FAMILY = 4
+"""Categories that have something in common, as ovens and toasters do."""
 
 
 @dataclass(frozen=True)
@@ -52,34 +59,36 @@ class SyntheticTokens:
     of_patch: FloatArray
     shared: float
     """Of a part's variance, what all instances of its category have in common."""
+    kin: float
+    """Of a category's variance, what it has in common with its family."""
     seed: int
 
     @staticmethod
     def like(recorded: Sequence[tuple[str, EncodedBurst]], whitening: Whitening, seed: int) -> tuple[SyntheticTokens, Levels, Levels]:
         """From (category, burst) of recordings; and how bursts match, recorded and synthetic."""
-        patches = [(category, whitened(sample_patches(burst), whitening).astype(np.float64)) for category, burst in recorded]
+        patches = [(category, whitened(sample_patches(burst), whitening)) for category, burst in recorded]
         means = {category: np.stack([each.mean(axis=(0, 1)) for named, each in patches if named == category]) for category, _ in patches}
         instance = float(np.mean([bursts.var(axis=0, ddof=1).sum() for bursts in means.values() if len(bursts) > 1]))
         category = max(float(np.stack([bursts.mean(axis=0) for bursts in means.values()]).var(axis=0, ddof=1).sum()) - instance / 2, 0.0)
         within = np.concatenate([(each - each.mean(axis=1, keepdims=True)).reshape(-1, each.shape[2]) for _, each in patches])
         covariance = within.T @ within / len(within)
         view = float(np.mean([each.mean(axis=1).var(axis=0, ddof=1).sum() for _, each in patches])) - float(np.trace(covariance)) / PATCHES
-        shape, size = _shipped_shape(whitening), covariance.shape[0]
+        size = covariance.shape[0]
         made = SyntheticTokens(
             whitening,
             np.linalg.inv(whitening.matrix.astype(np.float64)).astype(np.float32),
-            (shape * np.sqrt(category)).astype(np.float32),
-            (shape * np.sqrt(instance)).astype(np.float32),
+            _shipped_root(whitening, category),
+            _shipped_root(whitening, instance),
             float(np.sqrt(max(view, 0.0) / size)),
             _root(covariance).astype(np.float32),
+            0.5,
             0.5,
             seed,
         )
         real = levels([named for named, _ in patches], [each for _, each in patches])
-        low, high = 0.0, 1.0
-        for _ in range(STEPS):
-            made = replace(made, shared=(low + high) / 2)
-            low, high = (made.shared, high) if made.levels().same < real.same else (low, made.shared)
+        for _ in range(TURNS):
+            made = _chosen(lambda kin, made=made: replace(made, kin=kin), lambda found: found.other_spread, real.other_spread)  # type: ignore[misc]
+            made = _chosen(lambda shared, made=made: replace(made, shared=shared), lambda found: found.same, real.same)  # type: ignore[misc]
         return made, real, made.levels()
 
     def levels(self) -> Levels:
@@ -91,12 +100,16 @@ class SyntheticTokens:
     def patches(self, category: int, instance: int, views: int) -> FloatArray:
         """Whitened patches of an instance, shape (V, K, D); the same each time."""
         size = len(self.of_patch)
-        own, rng = np.random.default_rng([self.seed, category]), np.random.default_rng([self.seed, category, 1 + instance])
-        shared_parts = _normal(own, PARTS, size)
-        middle = _normal(own, size) @ self.of_category + _normal(rng, size) @ self.of_instance
-        parts = np.sqrt(self.shared) * shared_parts + np.sqrt(1 - self.shared) * _normal(rng, PARTS, size)
+        family, own = (np.random.default_rng([self.seed, *name]) for name in ((0, category // FAMILY), (1, category)))
+        rng = np.random.default_rng([self.seed, 2, category, instance])
+        common, middle = (
+            float(np.sqrt(self.kin)) * _normal(family, *shape) + float(np.sqrt(1 - self.kin)) * _normal(own, *shape)
+            for shape in ((PARTS, size), (size,))
+        )
+        middle = middle @ self.of_category + _normal(rng, size) @ self.of_instance
+        parts = float(np.sqrt(self.shared)) * common + float(np.sqrt(1 - self.shared)) * _normal(rng, PARTS, size)
         faces = (np.arange(views)[:, None] * PARTS // views + rng.integers(0, PARTS // 2, (views, PATCHES))) % PARTS
-        deviations = np.sqrt(1 - NOISE) * parts[faces] + np.sqrt(NOISE) * _normal(rng, views, PATCHES, size)
+        deviations = float(np.sqrt(1 - NOISE)) * parts[faces] + float(np.sqrt(NOISE)) * _normal(rng, views, PATCHES, size)
         return np.asarray(middle + self.view_spread * _normal(rng, views, 1, size) + deviations @ self.of_patch)
 
     def burst(self, category: int, instance: int, views: int) -> EncodedBurst:
@@ -108,7 +121,8 @@ class SyntheticTokens:
 
 def levels(categories: Sequence[str], patches: Sequence[FloatArray]) -> Levels:
     """How well bursts match, given their whitened patches, each (V, K, D)."""
-    adaptation = Adaptation.fit(patches)
+    fitted = Adaptation.fit(patches)
+    adaptation = Adaptation(fitted.mean.astype(np.float32), fitted.matrix.astype(np.float32))
     directions = [adaptation.directions(each) for each in patches]
     matches = np.stack([match_views(each, directions) for each in directions])
     named = np.array(categories)
@@ -116,12 +130,21 @@ def levels(categories: Sequence[str], patches: Sequence[FloatArray]) -> Levels:
     return Levels(float(matches[same & ~np.eye(len(named), dtype=bool)].mean()), float(matches[~same].mean()), float(matches[~same].std()))
 
 
-def _shipped_shape(whitening: Whitening) -> FloatArray:
-    """A root, shape (D, D), of the shipped covariance of tokens, whitened, with trace 1."""
+def _chosen(with_value: Callable[[float], SyntheticTokens], level: Callable[[Levels], float], wanted: float) -> SyntheticTokens:
+    """With the share at which a level, which grows with it, is as wanted."""
+    low, high = 0.0, 1.0
+    for _ in range(STEPS):
+        made = with_value((low + high) / 2)
+        low, high = ((low + high) / 2, high) if level(made.levels()) < wanted else (low, (low + high) / 2)
+    return made
+
+
+def _shipped_root(whitening: Whitening, variance: float) -> NDArray[np.float32]:
+    """A root, shape (D, D), of the shipped covariance of tokens, whitened, scaled to this total variance."""
     roots, vectors = np.linalg.eigh(whitening.matrix.astype(np.float64))
     widened = 1 / roots**2
     variances = (widened - widened.mean() * SHRINKAGE / (1 + SHRINKAGE)).clip(0) * roots**2
-    return np.asarray((vectors * np.sqrt(variances / variances.sum())) @ vectors.T)
+    return np.asarray((vectors * np.sqrt(variance * variances / variances.sum())) @ vectors.T, dtype=np.float32)
 
 
 def _root(covariance: FloatArray) -> FloatArray:

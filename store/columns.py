@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,7 @@ from core.sim3 import Sim3
 from store.folders import Files, FileSum
 from store.records import Pose
 
+DECISIONS_KEPT = 1024
 AFFINE9 = ("scales", "rotation", "translation")
 
 
@@ -71,8 +73,9 @@ def decision_to_json(decision: Decision) -> str:
     return json.dumps(vars(decision))
 
 
+@lru_cache(maxsize=DECISIONS_KEPT)
 def decision_from_json(text: str) -> Decision:
-    """The inverse of `decision_to_json`."""
+    """The inverse of `decision_to_json`; every decision reads the latest few hundred, all but one of them again."""
     fields = json.loads(text)
     similarities = tuple((category_id, similarity) for category_id, similarity in fields.pop("similarities"))
     return Decision(**fields, similarities=similarities)

@@ -85,7 +85,8 @@ def _measure(probe: Probe) -> GrowthRow:
         exact = _exact(memory, probe, whitening) if probe.exact else None
         few = memory.categories.enrolled(whitening).exact
         _insert(probe.folder, [probe.novel])
-        learnt, _ = _timed(lambda: decide(memory, probe.known[-1]))
+        learnt, _ = _timed(partial(decide, memory, probe.known[-1]))
+        memory.categories.delete(memory.instances.listed()[-1].category_id)
     times = [seconds for seconds, _ in again]
     return GrowthRow(
         categories=len(members),
