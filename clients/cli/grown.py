@@ -54,6 +54,7 @@ def _measure(probe: Probe) -> GrowthRow:
     from benchmarks.growth import GrowthRow
     from core.backbones.whitening import Whitening
     from core.enrolled import NEAREST
+    from service.compute import Solver
     from service.judgement import Judge
     from store.memory import Memory
 
@@ -62,7 +63,7 @@ def _measure(probe: Probe) -> GrowthRow:
     def decide(memory: Memory, burst: EncodedBurst) -> Decision:
         from core.novelty import DecisionConfig
 
-        return Judge(memory, burst, whitening).judge(DecisionConfig()).decision
+        return Judge(memory, burst, whitening, Solver()).judge(DecisionConfig()).decision
 
     with TemporaryDirectory() as folder, Memory.open(Path(folder)) as empty:  # loads what any decision needs
         _insert(Path(folder), [probe.novel])

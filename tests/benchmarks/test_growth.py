@@ -1,0 +1,72 @@
+"""The growth bench: its tokens are like recorded ones, and it asks the memory that it filled."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks import growth
+from benchmarks.growth import GrowthRow, Probe
+from benchmarks.synthetic_tokens import Levels, SyntheticTokens
+from core.backbones.whitening import Whitening
+from core.encode import EncodedBurst
+from core.errors import InvalidInput
+from core.evidence import PATCHES, whitened
+
+DIM = 32
+WHITENING = Whitening.fit(np.random.default_rng(0).normal(size=(2000, DIM)) * np.linspace(0.3, 2, DIM) + 0.5)
+TOKENS = SyntheticTokens(
+    WHITENING, np.linalg.inv(WHITENING.matrix), np.eye(DIM) * 0.5, np.eye(DIM) * 0.2, 0.1, np.eye(DIM) * 0.5, 0.7, 0.5, 0
+)
+LEVELS = Levels(0.3, 0.1, 0.02)
+
+
+def test_the_same_instance_is_the_same_tokens_and_no_other_is() -> None:
+    burst = TOKENS.burst(3, 0, 4)
+    assert np.array_equal(burst.pooled, TOKENS.burst(3, 0, 4).pooled)
+    assert not np.array_equal(burst.pooled, TOKENS.burst(3, 1, 4).pooled)
+    assert [view.descriptors.shape for view in burst.views] == [(PATCHES, DIM)] * 4
+
+
+def test_raw_tokens_are_whitened_to_what_was_drawn() -> None:
+    view = TOKENS.burst(5, 0, 2).views[1]
+    np.testing.assert_allclose(whitened(view.descriptors, WHITENING), TOKENS.patches(5, 0, 2)[1], atol=1e-3)
+    np.testing.assert_allclose(view.pooled, TOKENS.patches(5, 0, 2)[1].mean(axis=0), atol=1e-3)
+
+
+def test_bursts_of_a_category_match_better_than_others() -> None:
+    found = TOKENS.levels()
+    assert found.same > found.other + found.other_spread
+
+
+def test_shares_are_chosen_such_that_bursts_match_as_recorded() -> None:
+    recorded = [(f"{category}", TOKENS.burst(category, instance, 6)) for category in range(8) for instance in range(2)]
+    _, real, made = SyntheticTokens.like(recorded, WHITENING, seed=1)
+    assert made.same == pytest.approx(real.same, abs=0.03)
+    assert made.other == pytest.approx(real.other, abs=0.05)
+
+
+def test_each_size_is_asked_after_it_was_filled(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(growth, "synthetic_tokens", lambda data, backbone, seed: (TOKENS, LEVELS, LEVELS))
+    filled: list[int] = []
+    probes: list[Probe] = []
+
+    def fill(folder: Path, bursts: Iterable[EncodedBurst]) -> None:
+        filled.append(sum(1 for _ in bursts))
+
+    def measure(probe: Probe) -> GrowthRow:
+        probes.append(probe)
+        figures = dict.fromkeys(growth.COLUMNS, 1.0) | {"categories": sum(filled), "exact": True}
+        return GrowthRow(**figures)
+
+    rows = growth.run(fill, measure, tmp_path / "growth.json", tmp_path / "growth.png", (2, 5), views=2, rounds=3, exact_up_to=2)
+    assert filled == [2, 3]
+    assert [row.categories for row in rows] == [2, 5]
+    assert [probe.exact for probe in probes] == [True, False]
+    assert all(len(probe.known) == 3 and max(probe.right) < count for probe, count in zip(probes, (2, 5)))
+    assert {file.name for file in tmp_path.iterdir()} == {"growth.json", "growth.png"}
+    with pytest.raises(InvalidInput, match="growing"):
+        growth.run(fill, measure, None, categories=(5, 2))
