@@ -52,6 +52,8 @@ class Sample:
     resident_mb: float
     running: float
     waiting: float
+    cpu_s: float = 0.0
+    """Processor time of the service's process since it began."""
 
 
 @dataclass
@@ -115,7 +117,8 @@ async def _watch(url: str, record: Record, start: float, every_s: float, over: a
             found = await observer.send(figures())
             resident_mb = found["process_resident_memory_bytes"] / MEGABYTE
             now = time.perf_counter() - start
-            record.samples.append(Sample(now, resident_mb, found["onelook_work_running"], found["onelook_work_waiting"]))
+            queue = found["onelook_work_running"], found["onelook_work_waiting"]
+            record.samples.append(Sample(now, resident_mb, *queue, found["process_cpu_seconds_total"]))
             tell(record)
             try:
                 await asyncio.wait_for(over.wait(), every_s)

@@ -49,6 +49,8 @@ class LoadRow:
     """Requests in the queue."""
     resident_mb: float
     """Of the service, at most."""
+    cpu_s: float
+    """Processor time of the service's process for an answer; on a cluster, of the memory's owner alone."""
 
 
 COLUMNS = tuple(field.name for field in fields(LoadRow))
@@ -118,6 +120,7 @@ def load_row(robots: int, seconds: float, record: Record) -> LoadRow:
         float(np.mean(waiting)),
         max(waiting),
         max(sample.resident_mb for sample in record.samples),
+        (record.samples[-1].cpu_s - record.samples[0].cpu_s) / max(1, len(answered)),
     )
 
 

@@ -35,6 +35,7 @@ def test_more_robots_than_places_are_refused_and_nobody_fails(url: str, recorded
     assert 0 < alone.p50_s <= alone.p95_s <= alone.p99_s
     assert crowded.refused > 0
     assert crowded.failed == 0
+    assert 0 < alone.cpu_s < 2
     assert crowded.waiting_max == 1
     written = json.loads((tmp_path / "load.json").read_text())
     assert [row["robots"] for row in written["rows"]] == [1, 6]

@@ -45,12 +45,24 @@ class OnRay:
         return pid == self.child.pid
 
 
-@contextmanager
-def on_ray(memory: Path, log: Path, pass_s: float = 0.0) -> Iterator[OnRay]:
-    """A service on that folder."""
+def free_port() -> int:
+    """One that nobody has yet."""
     with socket.create_server(("127.0.0.1", 0)) as probe:
-        port = probe.getsockname()[1]
-    command = [sys.executable, str(Path(__file__).with_name("service_on_ray.py")), str(memory), str(port), str(pass_s)]
+        return int(probe.getsockname()[1])
+
+
+@contextmanager
+def on_ray(memory: Path, log: Path) -> Iterator[OnRay]:
+    """A service on that folder."""
+    port = free_port()
+    command = [sys.executable, str(Path(__file__).with_name("service_on_ray.py")), "ray", str(memory), str(port), "0"]
+    with started(command, port, log) as running:
+        yield running
+
+
+@contextmanager
+def started(command: list[str], port: int, log: Path) -> Iterator[OnRay]:
+    """A service that a command starts on a port, once it answers."""
     environment = {name: value for name, value in os.environ.items() if name != "RAY_ADDRESS"}
     environment |= {"PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1", "RAY_SERVE_PROXY_GRACEFUL_SHUTDOWN_TIMEOUT_S": "0.5"}
     with log.open("ab") as output, subprocess.Popen(command, stdout=output, stderr=output, env=environment) as child:
