@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import logging
 import socket
+import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import ClassVar
@@ -149,3 +150,8 @@ def test_a_wrong_setting(serve: Callable[..., Result], monkeypatch: pytest.Monke
     monkeypatch.setenv("ONELOOK_MAX_VIEWS", "many")
     refused(serve(), "ONELOOK_MAX_VIEWS", "'many'")
     refused(serve("--port", 70_000), "--port", "70000")
+
+
+def test_a_cluster_takes_libraries_of_its_own(serve: Callable[..., Result], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "ray", None)
+    refused(serve("--cluster"), "needs ray", "onelook[server,cluster]")
