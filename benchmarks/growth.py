@@ -52,8 +52,9 @@ class GrowthRow:
     exact: bool
     """Whether the service compares every member patch by patch at this size."""
     decide_ms: float
+    least_ms: float
     p95_ms: float
-    """A decision on an object that was decided on before."""
+    """A decision on an object that was decided on before: median, the quickest, which other work on the machine disturbs least, and p95."""
     nearest_ms: float
     """Of it, the product with all pooled means."""
     store_ms: float

@@ -29,14 +29,14 @@ T = TypeVar("T")
 
 EXACT = 64
 """Members up to which every one is compared patch by patch: about 25 ms on two cores with ten views a side."""
-NEAREST = 16
+NEAREST = 12
 """Members, and founders of categories, that are compared patch by patch in a larger memory."""
 ADAPTED_FROM = 256
 """Members, evenly spaced, whose patches a larger memory is adapted to; more say nothing new."""
 GROWTH = 1.25
 """Factor by which a larger memory grows until it is adapted anew, which all comparisons kept so far are lost by."""
-KEPT = 256
-"""Members whose patches stay in memory, those compared last: about 100 MB of ten views each."""
+KEPT = 1024
+"""Members whose patches stay in memory, those compared last: up to 200 MB of ten views each, in half precision."""
 KEPT_COHORTS = 4096
 """Members whose matches with founders stay in memory: about 10 MB."""
 
@@ -148,8 +148,9 @@ class Enrolled:
         missing = [each for each in ids if each not in there]
         if missing:
             read = self._read(missing)
-            there.update(zip(missing, self._directions([read[each] for each in missing])))
-        return [self._patches.keep(each, there[each]) for each in ids]
+            directions = self._directions([read[each] for each in missing])
+            there.update(zip(missing, directions if self.exact else [each.half() for each in directions]))
+        return [self._patches.keep(each, there[each]).float() for each in ids]
 
     def _read(self, ids: Sequence[str]) -> Mapping[str, FloatArray]:
         read = self._source.patches(ids) if ids else {}

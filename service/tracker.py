@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -16,7 +16,11 @@ from core.reference import Reference
 from core.sim3 import Sim3
 from core.tracking import Track, TrackConfig, missed, seen, with_symmetries
 from core.views import Burst, View
+from core.warm import Settled, WarmConfig, follow, settle
 from service.agent import Agent
+
+SOUGHT_ANEW_AFTER = 15
+"""Frames for which an object is followed from its last pose: a pose that was wrong from the start must not stay."""
 
 
 @dataclass(frozen=True)
@@ -30,6 +34,7 @@ class TrackOptions:
     variant: str = "ucd"
     seed: int = 0
     track: TrackConfig = field(default_factory=TrackConfig)
+    warm: WarmConfig = field(default_factory=WarmConfig)
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,6 +83,9 @@ class Tracker:
         self._estimator = PoseEstimator(PoseConfig.named(options.variant))
         self._views: deque[tuple[EncodedView, float]] = deque(maxlen=options.window)
         self._track = Track()
+        self._settled: Settled | None = None
+        self._followed = 0
+        """Frames since the last full solve."""
         self._last_s: float | None = None
         self._reference: Reference | None = None
         self.category_id: str | None = None
@@ -125,8 +133,7 @@ class Tracker:
         return decision
 
     def _measure(self, reference: Reference, now_s: float, elapsed_s: float) -> None:
-        estimate = self._estimator.estimate(reference, self._burst, seed=self._options.seed)
-        poses = [estimate.target_from_reference, *(each.target_from_reference for each in estimate.alternatives)]
+        poses = self._followed_pose(reference) or self._solved(reference)
         center = reference.box.world_from_object[:3, 3]
         before = self._track
         self._track = seen(
@@ -141,6 +148,26 @@ class Tracker:
         if before.jumped is not None and self._track.jumped is None:
             while len(self._views) > self._options.track.believe_after:  # earlier views may show the object where it was
                 self._views.popleft()
+
+    def _followed_pose(self, reference: Reference) -> list[Sim3]:
+        """From the last pose; none where it must be sought anew: a jump waits to be believed, or it was followed for long enough."""
+        whole = len(self._views) == self._options.window  # until then each view may tell a better pose
+        if self._settled is None or self._track.pose is None or self._track.jumped is not None or not whole:
+            return []
+        if self._followed >= SOUGHT_ANEW_AFTER:
+            return []
+        before = replace(self._settled, pose=self._track.pose)
+        settled = follow(reference, self._burst, before, self._options.warm, self._options.seed)
+        self._settled, self._followed = settled, self._followed + 1
+        return [settled.pose] if settled else []
+
+    def _solved(self, reference: Reference) -> list[Sim3]:
+        """The estimate and its alternatives, most credible first. Raises NoPose."""
+        self._settled, self._followed = None, 0
+        estimate = self._estimator.estimate(reference, self._burst, seed=self._options.seed)
+        pose = estimate.target_from_reference
+        self._settled = settle(reference, self._burst, pose, self._options.warm, self._options.seed)
+        return [pose, *(each.target_from_reference for each in estimate.alternatives)]
 
     @property
     def _burst(self) -> EncodedBurst:

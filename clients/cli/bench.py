@@ -127,6 +127,21 @@ def growth(
 
 
 @app.command()
+def track(
+    grid: Annotated[list[int], typer.Option(min=4, help="Patches a side of the close crop; may be repeated.")] = [16, 28],  # noqa: B006
+    rate: Annotated[float, typer.Option(min=0.1, help="Frames a second of the camera.")] = 15,
+    seconds: Annotated[float, typer.Option(min=1, help="For each service.")] = 20,
+    data: Samples = None,
+    json: JsonFile = None,
+) -> None:
+    """Sustained rate, latency and dropped frames of a followed object, from the last pose and solved anew each time."""
+    from benchmarks.track import run
+    from clients.cli.tracked import serve
+
+    run(serve, json, grid, rate, seconds, data)
+
+
+@app.command()
 def rendering(
     category: Categories = None,
     frames: Annotated[int, typer.Option(min=1, help="Frames of each object.")] = 12,

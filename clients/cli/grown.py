@@ -93,6 +93,7 @@ def _measure(probe: Probe) -> GrowthRow:
         categories=len(members),
         exact=few,
         decide_ms=float(np.median(times)),
+        least_ms=min(times),
         p95_ms=float(np.percentile(times, 95)),
         nearest_ms=float(np.median(nearest)),
         store_ms=float(np.median(store)),

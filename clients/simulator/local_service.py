@@ -33,7 +33,7 @@ def local_service(memory: Path, log: Path, settings: Mapping[str, str] = Mapping
 
     Raises Unreachable with the end of the log where it does not start.
     """
-    address = f"http://{HOST}:{(port := _free_port())}"
+    address = f"http://{HOST}:{(port := free_port())}"
     command = [sys.executable, "-m", "clients.cli", "serve", "--host", HOST, "--port", str(port), "--data-dir", str(memory)]
     before = signal.signal(signal.SIGTERM, _leave)
     with log.open("w") as output:
@@ -59,7 +59,8 @@ def _leave(number: int, frame: FrameType | None) -> None:
     raise SystemExit(128 + number)
 
 
-def _free_port() -> int:
+def free_port() -> int:
+    """One of HOST that nobody listens on now."""
     with socket.socket() as probe:
         probe.bind((HOST, 0))
         return int(probe.getsockname()[1])

@@ -16,6 +16,7 @@ from starlette.websockets import WebSocketDisconnect
 
 from core.scan import hemisphere
 from core.sim3 import Sim3, rotation_angle_deg
+from service import tracker
 from service.app import create_app
 from service.routes.track import WAITING_FRAMES, Waiting
 
@@ -227,3 +228,40 @@ def test_what_waits_is_bounded():
         assert await waiting.take() is None
 
     anyio.run(flood)
+
+
+@pytest.fixture
+def solves(monkeypatch):
+    """Frames for which the pose was sought anew."""
+    sought = []
+    estimate = tracker.PoseEstimator.estimate
+
+    def counted(self, *args, **options):
+        sought.append(args)
+        return estimate(self, *args, **options)
+
+    monkeypatch.setattr(tracker.PoseEstimator, "estimate", counted)
+    return sought
+
+
+def test_an_object_is_followed_from_its_last_pose_without_seeking_it(track, category, camera_round, solves):
+    answers = track([message(*each) for each in enumerate(camera_round(PLACED, 9))], category_id=category["id"], window=2)
+    assert len(solves) <= 4  # the window is full with the second frame
+    assert all(answer["measured"] for answer in answers[2:])
+    matrix = answers[-1]["pose"]["target_from_reference"]
+    assert rotation_angle_deg(np.array(matrix["matrix"])[:3, :3] / matrix["scale"], PLACED.rotation) < 5
+
+
+def test_an_object_that_jumped_is_sought_anew(track, category, camera_round, solves):
+    track([message(*each) for each in enumerate(camera_round(PLACED, 6))], category_id=category["id"], window=2)
+    before = len(solves)
+    views = [*camera_round(PLACED, 6), *camera_round(MOVED, 6)]
+    answers = track([message(*each) for each in enumerate(views)], category_id=category["id"], window=2)
+    assert len(solves) - before > before
+    assert np.linalg.norm(np.array(answers[-1]["pose"]["world_from_object"])[:2, 3] - MOVED.translation[:2]) < 0.03
+
+
+def test_what_is_followed_for_long_is_sought_anew(track, category, camera_round, solves, monkeypatch):
+    monkeypatch.setattr(tracker, "SOUGHT_ANEW_AFTER", 0)
+    track([message(*each) for each in enumerate(camera_round(PLACED, 5))], category_id=category["id"], window=2)
+    assert len(solves) == 5
