@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from core.encode import EncodedBurst
+from core.enrolled import ADAPTED_FROM, NEAREST
 from core.errors import Conflict, InvalidInput, NotFound, Unavailable
-from core.novelty import Decision
+from core.novelty import Decision, decide
 from core.reference import Reference
 from core.scan import ScanRequest
 from core.views import Burst
+from store import arrays, instances
+from store.arrays import Array
+from store.connection import Connection
+from store.instances import insert_instance
 from store.memory import Memory
 from store.observations import Answer, Joins
 from store.records import Category, Instance, Observation
@@ -139,3 +147,71 @@ def test_damaged_tokens_are_left_out_and_the_rest_goes_on(memory: Memory, catego
         db.execute("UPDATE instances SET cls = zeroblob(4) WHERE id = ?", [joined.id])
     assert len(memory.categories.members()) == 1
     assert joined.id in caplog.text
+
+
+def fill(folder: Path, encoded: EncodedBurst, count: int) -> None:
+    """So many categories of one burst each, of rows alone."""
+    connection = Connection(folder)
+    with connection.change() as db:
+        rows = [{"id": f"{number}", "created_at": "", "views": 3, "extent_m": "[1,1,1]", "reference_sha256": ""} for number in range(count)]
+        db.table("categories").insert_all([row | {"files": "{}", "origin_id": row["id"]} for row in rows])
+        rng = np.random.default_rng(0)
+        for row in rows:
+            views = [replace(view, pooled=rng.normal(size=8).astype(np.float32)) for view in encoded.views]
+            insert_instance(db, row["id"], replace(encoded, views=tuple(views)), source="scan", source_id=None, how="scan")
+    connection.close()
+
+
+@pytest.fixture
+def reads(monkeypatch: pytest.MonkeyPatch) -> list[bytes]:
+    """Patches that are taken from rows."""
+    taken: list[bytes] = []
+    take = instances.patches_from_blob
+
+    def noted(blob: bytes, *shape: int) -> Array:
+        taken.append(blob)
+        return take(blob, *shape)
+
+    monkeypatch.setattr(instances, "patches_from_blob", noted)
+    monkeypatch.setattr(arrays, "read_whole", lambda *_: pytest.fail("a file of arrays is read"))
+    return taken
+
+
+def test_opening_reads_no_tokens_and_a_decision_only_those_near(folder: Path, encoded: EncodedBurst, reads: list[bytes]) -> None:
+    Memory.open(folder).close()
+    fill(folder, encoded, 1000)
+    with Memory.open(folder) as memory:
+        assert reads == []
+        decide(memory.categories.enrolled(None), encoded)
+        first = len(reads)
+        assert first <= ADAPTED_FROM + NEAREST * (NEAREST + 2)
+        decide(memory.categories.enrolled(None), encoded)
+        assert len(reads) == first
+
+
+def test_members_are_listed_anew_only_where_they_changed(memory: Memory, category: Category, other: Category, burst, encoded) -> None:
+    listed = memory.instances.listed()
+    assert memory.instances.listed() is listed
+    memory.categories.rename(category.id, "another name")
+    memory.observations.create(answer(category.id), burst, FEATURES)
+    assert memory.instances.listed() is listed
+    memory.observations.create(answer(category.id), burst, FEATURES, joins=Joins(category.id, encoded, 0.9, "decision"))
+    joined = memory.instances.listed()
+    assert [each.category_id for each in joined] == [category.id, other.id, category.id]
+    memory.categories.merge(category.id, other.id)
+    assert [each.category_id for each in memory.instances.listed()] == [other.id] * 3
+    memory.undo(memory.audit.latest(1)[0].id)
+    assert memory.instances.listed() == joined
+    memory.instances.forget(category.id, joined[2].id)
+    memory.categories.delete(other.id)
+    assert [each.category_id for each in memory.instances.listed()] == [category.id]
+
+
+def test_a_decision_leaves_out_damaged_patches(memory: Memory, category: Category, joined: Instance, encoded: EncodedBurst, caplog) -> None:
+    connection = Connection(memory.folder)
+    with connection.change() as db:
+        db.execute("UPDATE instances SET patches = zeroblob(length(patches)) WHERE id = ?", [joined.id])
+    connection.close()
+    for _ in range(2):
+        assert decide(memory.categories.enrolled(None), encoded).similarities[0][0] == category.id
+    assert caplog.text.count("are damaged and left out") == 1
