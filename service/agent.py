@@ -158,7 +158,7 @@ class Agent:
 
     def names(self) -> dict[str, str | None]:
         """Of all categories, by id."""
-        return {category.id: category.name for category in self.memory.categories.all()}
+        return self.memory.categories.names()
 
     def encoded(self, observation_id: str) -> EncodedBurst:
         """The encoded burst of an observation. Raises NotFound."""

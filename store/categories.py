@@ -75,6 +75,10 @@ class Categories:
         """All of them, oldest first."""
         return [_category(row) for row in self._connection.rows(f"{SELECT} ORDER BY c.rowid")]
 
+    def names(self) -> dict[str, str | None]:
+        """Of all of them, by id: every answer asks for these, and for nothing else of categories that it does not name."""
+        return {row["id"]: row["name"] for row in self._connection.rows("SELECT id, name FROM categories WHERE removed_by IS NULL")}
+
     def listing(self, limit: int, offset: int = 0, *, order: Order = "name", called: str | None = None) -> Listing:
         """A page of those whose name has `called` in it, or whose id begins so, with what was seen of each."""
         return listing(self._connection, limit, offset, order=order, called=called)

@@ -99,3 +99,10 @@ def test_two_categories_keep_their_order(
 ) -> None:
     second = memory.categories.create(reference, burst, encoded)
     assert [each.id for each in memory.categories.all()] == [category.id, second.id]
+
+
+def test_names_are_those_of_living_categories(memory: Memory, category: Category, other: Category) -> None:
+    assert memory.categories.names() == {category.id: "cup", other.id: "mug"}
+    memory.categories.rename(other.id, None)
+    memory.categories.delete(category.id)
+    assert memory.categories.names() == {other.id: None}
