@@ -162,12 +162,17 @@ class Tracker:
         return [settled.pose] if settled else []
 
     def _solved(self, reference: Reference) -> list[Sim3]:
-        """The estimate and its alternatives, most credible first. Raises NoPose."""
+        """The estimate and its alternatives, most credible first, after the last pose where that lays the object on better: few views
+        mislead a solve more often than a pose that many frames agreed on. Raises NoPose."""
         self._settled, self._followed = None, 0
         estimate = self._estimator.estimate(reference, self._burst, seed=self._options.seed)
-        pose = estimate.target_from_reference
-        self._settled = settle(reference, self._burst, pose, self._options.warm, self._options.seed)
-        return [pose, *(each.target_from_reference for each in estimate.alternatives)]
+        poses = [estimate.target_from_reference, *(each.target_from_reference for each in estimate.alternatives)]
+        asked = [pose for pose in (self._track.pose, poses[0]) if pose is not None]
+        settled = [settle(reference, self._burst, pose, self._options.warm, self._options.seed) for pose in asked]
+        self._settled = max((each for each in settled if each), key=lambda each: each.score, default=None)
+        if self._settled is not None and self._settled.pose is not poses[0]:
+            poses.insert(0, self._settled.pose)
+        return poses
 
     @property
     def _burst(self) -> EncodedBurst:

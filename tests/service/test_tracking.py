@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import json
 import threading
+from dataclasses import replace
 
 import anyio
 import cv2
@@ -265,3 +266,21 @@ def test_what_is_followed_for_long_is_sought_anew(track, category, camera_round,
     monkeypatch.setattr(tracker, "SOUGHT_ANEW_AFTER", 0)
     track([message(*each) for each in enumerate(camera_round(PLACED, 5))], category_id=category["id"], window=2)
     assert len(solves) == 5
+
+
+def test_a_solve_that_lays_the_object_on_worse_than_the_last_pose_is_not_believed(track, category, camera_round, monkeypatch):
+    estimate = tracker.PoseEstimator.estimate
+    count = [0]
+
+    def misled(self, *args, **options):
+        found = estimate(self, *args, **options)
+        count[0] += 1
+        upside_down = Sim3(1.0, Rotation.from_euler("x", 180, degrees=True).as_matrix(), np.zeros(3))
+        return found if count[0] < 3 else replace(found, target_from_reference=found.target_from_reference @ upside_down)
+
+    monkeypatch.setattr(tracker.PoseEstimator, "estimate", misled)
+    monkeypatch.setattr(tracker, "SOUGHT_ANEW_AFTER", 0)
+    answers = track([message(*each) for each in enumerate(camera_round(PLACED, 9))], category_id=category["id"], window=3)
+    assert count == [9]
+    last = answers[-1]["pose"]["target_from_reference"]
+    assert rotation_angle_deg(np.array(last["matrix"])[:3, :3] / last["scale"], PLACED.rotation) < 10
