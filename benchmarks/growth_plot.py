@@ -13,6 +13,8 @@ if TYPE_CHECKING:
 
 SIZE = (12, 3.8)
 DPI = 110
+ROOM = 0.6
+"""Share of an axis that is added above for the legend."""
 TARGET_MS = 10.0
 """A decision at 10,000 categories."""
 
@@ -43,7 +45,9 @@ def plot_growth(file: Path, rows: Sequence[GrowthRow], title: str) -> None:
     start.set(ylabel="ms", yscale="log")
     for panel in (decision, memory, start):
         panel.set(xlabel="categories", xscale="log")
-        panel.legend(fontsize=8)
+        low, high = panel.get_ylim()
+        panel.set_ylim(low, high * (high / low) ** ROOM)
+        panel.legend(fontsize=8, loc="upper left")
     file.parent.mkdir(parents=True, exist_ok=True)
     figure.suptitle(title, fontsize=10)
     figure.savefig(file, dpi=DPI)
