@@ -23,6 +23,8 @@ from core.views import Burst, Camera, View
 
 FloatArray = NDArray[np.floating]
 
+SHARED = 32
+"""Views are shown a multiple of so many patches: those that see as many go through the backbone together."""
 MAX_COVER = 0.95
 """A foreground that covers more of the whole image than this is a blank wall, not an object."""
 
@@ -43,6 +45,10 @@ class EncoderConfig:
     """Patches a side in the first pass: 224 px at 14 px a patch."""
     grid: int = 28
     """Patches a side in the close crop; the paper's feature map."""
+    context: int | None = 2
+    """Patches around what the first pass takes for the object that the second pass sees as well; None shows it the whole crop."""
+    context_threshold: float = 0.4
+    """Foreground probability in the first pass above which the second pass looks closer."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,7 +137,8 @@ class Encoder:
         found = [self._find(view, window, soft) for view, window, soft in zip(burst.views, whole, coarse)]
         windows = [window or fallback for window, fallback in zip(found, whole)]
         clock.lap("find")
-        features = self._extract(burst, windows, self.config.grid)
+        shown = [self._shown(*each) for each in zip(burst.views, whole, coarse, found)]
+        features = self._extract(burst, windows, self.config.grid, shown)
         fine = self._soft_foreground(features)
         clock.lap("features")
         views = []
@@ -143,9 +150,28 @@ class Encoder:
         clock.lap("points")
         return EncodedBurst(tuple(views), self.backbone.fingerprint, clock.stage_ms)
 
-    def _extract(self, burst: Burst, windows: Sequence[Window], grid: int) -> Features:
-        side = grid * self.backbone.patch_size
-        return self.backbone.extract(np.stack([window.cut(view.rgb, side) for view, window in zip(burst.views, windows)]))
+    def _extract(self, burst: Burst, windows: Sequence[Window], grid: int, shown: Sequence[NDArray[np.uint8]] = ()) -> Features:
+        """Of the patches that are shown, one map of 0 and 1 a view, or of all."""
+        patch = self.backbone.patch_size
+        images = np.stack([window.cut(view.rgb, grid * patch) for view, window in zip(burst.views, windows)])
+        if shown:
+            images = np.concatenate([images, np.stack(shown).repeat(patch, axis=1).repeat(patch, axis=2)[..., None]], axis=3)
+        return self.backbone.extract(images)
+
+    def _shown(self, view: View, whole: Window, coarse: FloatArray, found: Window | None) -> NDArray[np.uint8]:
+        """Which patches of the close crop the second pass sees, shape (G, G): what may be object, what is near it, and a few more, so
+        that views share passes. Attention is relative to a whole picture, and needs it."""
+        grid, context = self.config.grid, self.config.context
+        shown = np.ones((grid, grid), np.uint8)
+        if found is None:
+            return np.zeros_like(shown)
+        if context is None or self._source == "attention":
+            return shown
+        soft = found.cut(whole.paste(coarse, view.size) if view.mask is None else view.mask.astype(np.float32), grid)
+        away = cv2.distanceTransform((soft <= self.config.context_threshold).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+        count = -(-np.count_nonzero(away <= context) // SHARED) * SHARED
+        shown.flat[np.argsort(away, axis=None, kind="stable")[count:]] = 0
+        return shown
 
     def _find(self, view: View, whole: Window, soft: FloatArray) -> Window | None:
         """The close window of the object; None where nothing stands out, or everything does."""

@@ -73,7 +73,7 @@ def fit_plane(points: FloatArray, tolerance_m: float) -> tuple[FloatArray, Float
     RANSAC over points, shape (N, 3), N ≥ 3, with a fixed seed, and a least-squares fit to the inliers.
     """
     rng = np.random.default_rng(0)
-    kept = points[rng.permutation(len(points))[:PLANE_SAMPLE]].astype(np.float64)
+    kept = points[rng.permutation(len(points))[:PLANE_SAMPLE]].astype(np.float32)
     corners = kept[rng.integers(0, len(kept), (PLANE_TRIALS, 3))]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     length = np.linalg.norm(normals, axis=1)

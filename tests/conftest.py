@@ -53,6 +53,8 @@ class ColourBackbone:
         self.calls += 1
         views, side = images.shape[:2]
         grid = side // self.patch_size
+        seen = images[..., 3:].any(axis=3) if images.shape[3] == 4 else np.ones(images.shape[:3], dtype=bool)
+        images = images[..., :3] * seen[..., None]
         patches = images.reshape(views, grid, self.patch_size, grid, self.patch_size, 3).mean(axis=(2, 4))
         tokens = np.cos(patches @ self._waves + self._phases).astype(np.float32)
         attention, saliency = ((each.max(axis=3) > 25).astype(np.float32) for each in (patches, images))

@@ -44,5 +44,9 @@ class Backbone(Protocol):
     """Hash of weights, layer and preprocessing: tokens of different fingerprints cannot be compared."""
 
     def extract(self, images: NDArray[np.uint8]) -> Features:
-        """Features of square RGB images, shape (V, S, S, 3), S a multiple of `patch_size`."""
+        """Features of square RGB images, shape (V, S, S, 3), S a multiple of `patch_size`.
+
+        With a fourth channel, shape (V, S, S, 4), patches whose pixels are 0 there take no part, which saves their time: they lend
+        no context, and their tokens, attention and saliency are 0. An image without any patch has a [CLS] of 0.
+        """
         ...

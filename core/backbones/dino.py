@@ -54,73 +54,111 @@ class DinoBackbone:
         self._heads: int = config.num_attention_heads
         self._prefix = 1 + getattr(config, "num_register_tokens", 0)
         self._model: Any = model.eval().requires_grad_(False).to(device)
-        self._decoder = decoder.eval().requires_grad_(False).to(device) if decoder else None
+        self._decoder = decoder.eval().requires_grad_(False).to(device, memory_format=torch.channels_last) if decoder else None
         self._blocks = _blocks(model)
         self._layer, self._device, self._dtype, self._batch = min(layer, len(self._blocks) - 1), device, dtype, batch
-        self.fingerprint = _fingerprint([model, decoder], whitening, f"{PREPROCESSING}:layer{self._layer}:{dtype}")
+        self.fingerprint = _fingerprint([model, decoder], whitening, f"{PREPROCESSING}:layer{self._layer}")
+        for module in self._blocks.modules():
+            if isinstance(module, nn.Linear):
+                module.to(dtype)  # once, rather than in every pass
 
     def extract(self, images: NDArray[np.uint8]) -> Features:
-        """See `Backbone.extract`."""
-        parts = [self._forward(images[start : start + self._batch]) for start in range(0, len(images), self._batch)]
-        patches, cls, attention = (np.concatenate([part[key] for part in parts]) for key in ("patches", "cls", "attention"))
-        saliency = np.concatenate([part["saliency"] for part in parts]) if self._decoder else None
-        return Features(patches, cls, attention, saliency)
+        """See `Backbone.extract`. Images that show as many patches share passes of up to `batch`."""
+        grid = images.shape[1] // self.patch_size
+        shown = _shown_patches(images, self.patch_size)
+        counts = shown.sum(axis=1)
+        features = Features(
+            np.zeros((len(images), grid, grid, self.dim), np.float32),
+            np.zeros((len(images), self.dim), np.float32),
+            np.zeros((len(images), grid, grid), np.float32),
+            np.zeros(images.shape[:3], np.float32) if self._decoder else None,
+        )
+        for count in np.unique(counts[counts > 0]):
+            alike = np.flatnonzero(counts == count)
+            for start in range(0, len(alike), self._batch):
+                part = alike[start : start + self._batch]
+                self._forward(images[part, :, :, :3], shown[part], features, part)
+        return features
 
     @torch.inference_mode()
-    def _forward(self, images: NDArray[np.uint8]) -> dict[str, NDArray[np.float32]]:
+    def _forward(self, images: NDArray[np.uint8], shown: NDArray[np.bool_], into: Features, rows: NDArray[np.intp]) -> None:
+        """Features of images that show as many patches each, written to their rows."""
         pixels = torch.from_numpy(np.ascontiguousarray(images)).to(self._device).permute(0, 3, 1, 2).float() / 255
         mean, deviation = (torch.tensor(value, device=self._device).view(1, 3, 1, 1) for value in (IMAGENET_MEAN, IMAGENET_DEVIATION))
-        pixels = (pixels - mean) / deviation
         caught: dict[str, Tensor] = {}
         attention: Any = self._blocks[-1].attention
-        hooks = [
-            attention.q_proj.register_forward_hook(_keep(caught, "query")),
-            attention.k_proj.register_forward_hook(_keep(caught, "key")),
-            self._blocks[self._layer].register_forward_hook(_keep(caught, "tokens")),
-        ]
+        hooks = [getattr(attention, f"{name}_proj").register_forward_hook(_keep(caught, name)) for name in ("q", "k")]
         try:
             with torch.autocast(torch.device(self._device).type, self._dtype, enabled=self._dtype != torch.float32):
-                tokens = self._run(pixels)
+                tokens, last = self._run((pixels - mean) / deviation, shown)
+                result = {"patches": tokens[:, self._prefix :], "cls": last[:, 0], "attention": self._cls_attention(caught)}
+                if self._decoder:
+                    grid = torch.zeros(len(shown), self.dim, shown.shape[1], dtype=last.dtype, device=last.device)
+                    grid.transpose(1, 2)[torch.from_numpy(shown)] = last[:, self._prefix :].flatten(0, 1)
+                    side = pixels.shape[-1] // self.patch_size
+                    result["saliency"] = self._decoder(grid.reshape(-1, self.dim, side, side), pixels.shape[-1])
         finally:
             for hook in hooks:
                 hook.remove()
-        side = pixels.shape[-1] // self.patch_size
-        patches = caught["tokens"][:, self._prefix :].float().reshape(-1, side, side, self.dim)
-        result = {"patches": patches, "cls": tokens[:, 0].float(), "attention": self._cls_attention(caught).reshape(-1, side, side)}
-        if self._decoder:
-            normalised = tokens[:, self._prefix :].float().transpose(1, 2).reshape(-1, self.dim, side, side)
-            result["saliency"] = self._decoder(normalised, pixels.shape[-1])
-        return {key: value.cpu().numpy() for key, value in result.items()}
+        found = {name: value.float().cpu().numpy() for name, value in result.items()}
+        where = shown.reshape(-1, *into.attention.shape[1:])
+        patches, attended = np.zeros((*where.shape, self.dim), np.float32), np.zeros(where.shape, np.float32)
+        patches[where], attended[where] = found["patches"].reshape(-1, self.dim), found["attention"].ravel()
+        into.patches[rows], into.cls[rows], into.attention[rows] = patches, found["cls"], attended
+        if into.saliency is not None:
+            into.saliency[rows] = found["saliency"] * where.repeat(self.patch_size, axis=1).repeat(self.patch_size, axis=2)
 
-    def _run(self, pixels: Tensor) -> Tensor:
+    def _run(self, pixels: Tensor, shown: NDArray[np.bool_]) -> tuple[Tensor, Tensor]:
+        """Tokens of the matching layer, and the last ones after their LayerNorm, of the patches that are shown."""
         extra = {} if self._model.config.model_type.startswith("dinov2") else {"interpolate_pos_encoding": True}
-        output: Tensor = self._model(pixel_values=pixels, **extra).last_hidden_state
-        return output
+        hidden = self._model.embeddings(pixels, **extra)
+        if not shown.all():
+            kept = np.pad(shown, ((0, 0), (self._prefix, 0)), constant_values=True)
+            hidden = hidden[torch.from_numpy(kept)].reshape(len(shown), -1, self.dim)
+        tokens = hidden
+        for index, block in enumerate(self._blocks):
+            hidden = block(hidden)
+            if index == self._layer:
+                tokens = hidden
+        return tokens, self._model.layernorm(hidden)
 
     def _cls_attention(self, caught: dict[str, Tensor]) -> Tensor:
-        """Attention from [CLS] to the patches in the last block, mean over heads, maximum 1, shape (V, G²)."""
-        query, key = (caught[name].float().reshape(*caught[name].shape[:2], self._heads, -1) for name in ("query", "key"))
+        """Attention from [CLS] to the patches in the last block, mean over heads, maximum 1, shape (V, patches shown)."""
+        query, key = (caught[name].float().reshape(*caught[name].shape[:2], self._heads, -1) for name in ("q", "k"))
         logits = torch.einsum("vhd,vthd->vht", query[:, 0], key) * (self.dim // self._heads) ** -0.5
         attention: Tensor = logits.softmax(dim=-1)[:, :, self._prefix :].mean(dim=1)
         return torch.div(attention, attention.amax(dim=1, keepdim=True))
+
+
+def fast_dtype(device: str) -> torch.dtype:
+    """bfloat16 where the device multiplies it natively, else float32. Tokens of the two have a cosine of 0.9999."""
+    if torch.device(device).type == "cuda":
+        native = torch.cuda.is_bf16_supported(including_emulation=False)
+    else:
+        native = any(torch.cpu.get_capabilities().get(name) for name in ("avx512_bf16", "amx_bf16"))
+    return torch.bfloat16 if native else torch.float32
 
 
 def load_backbone(
     name: str = EMBEDDED,
     *,
     device: str = "cpu",
-    dtype: torch.dtype = torch.float32,
+    dtype: torch.dtype | None = None,
     layer: int = MATCHING_LAYER,
     report: Report = lambda message: None,
 ) -> DinoBackbone:
     """A backbone by name (`dinov2-s14`, `dino-s8`), by folder in the hub's layout, or by hub name.
 
+    `dtype` is of the products, `fast_dtype(device)` where left out; tokens of different ones can be compared.
+
     Raises Unavailable, naming the remedy, when the weights are not there and cannot be fetched.
     """
+    dtype = fast_dtype(device) if dtype is None else dtype
+    attention = "eager" if torch.device(device).type == "cpu" and dtype != torch.float32 else "sdpa"  # fused is slow there
     source: str | Path = embedded_weights(report=report) if name == EMBEDDED else HUB_NAMES.get(name, name)
     transformers_logging.disable_progress_bar()  # type: ignore[no-untyped-call]
     try:
-        model = AutoModel.from_pretrained(source, attn_implementation="sdpa", dtype=torch.float32)
+        model = AutoModel.from_pretrained(source, attn_implementation=attention, dtype=torch.float32)
     except (OSError, ValueError) as error:
         raise Unavailable(f"backbone {name!r} could not be loaded from {source}: give a folder with config.json and weights") from error
     decoder_file = Path(source) / SALIENCY_FILE
@@ -134,6 +172,15 @@ def _blocks(model: Any) -> nn.ModuleList:
         if isinstance(module, nn.ModuleList):
             return module
     raise Unavailable(f"{type(model).__name__} has no list of transformer blocks: not a ViT")
+
+
+def _shown_patches(images: NDArray[np.uint8], patch_size: int) -> NDArray[np.bool_]:
+    """Which patches are not transparent all over, shape (V, G²)."""
+    grid = images.shape[1] // patch_size
+    if images.shape[3] == 3:
+        return np.ones((len(images), grid * grid), dtype=bool)
+    cells = images[..., 3].reshape(len(images), grid, patch_size, grid, patch_size)
+    return np.asarray(cells.any(axis=(2, 4)).reshape(len(images), -1))
 
 
 def _keep(caught: dict[str, Tensor], name: str) -> Callable[[nn.Module, Any, Any], None]:
