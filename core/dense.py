@@ -11,19 +11,19 @@ from functools import cached_property
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
 from core.affine9 import Affine9, fit_affine9
-from core.boxes import cloud_extent_m, inliers
-from core.encode import EncodedView
+from core.boxes import cloud_extent_m
 from core.estimators.batched import Sim3Batch, umeyama_batch
-from core.normals import outward_normals
 from core.sim3 import Sim3
+from core.surface import Surface
 from core.views import FloatArray
 
 BATCH = 32
 """Transforms scored at once; bounds memory at BATCH · N · Q numbers."""
+LEAST_LOG = -60.0
+"""Of a choice; smaller ones would be denormal numbers, which processors are slow with."""
 OPPOSITE = -0.5
 """Cosine between normals below which surfaces face opposite ways: 120° apart, since objects of a kind differ and normals are noisy."""
 
@@ -50,26 +50,27 @@ class DenseAgreement:
 
     def __init__(
         self,
-        reference: Sequence[EncodedView],
-        target: Sequence[EncodedView],
+        reference: Surface,
+        target: Surface,
         descriptors: tuple[Sequence[FloatArray], Sequence[FloatArray]],
         config: DenseConfig,
         seed: int,
     ) -> None:
-        """From views with trusted patches only, and the unit descriptors of those patches, one array a view."""
+        """`descriptors` are the unit descriptors of the surfaces' points, one array a view."""
         self.config = config
-        self._drawn = (reference, _draw(reference, config.points, seed)), (target, _draw(target, config.points, seed + 1))
-        self._reference, self._target = (_as_tensor(_points(views)[drawn]) for views, drawn in self._drawn)
+        self._drawn = (reference, reference.draw(config.points, seed)), (target, target.draw(config.points, seed + 1))
+        self._reference, self._target = (_as_tensor(surface.points_m[drawn]) for surface, drawn in self._drawn)
         of_reference, of_target = (
             _as_tensor(np.concatenate(described)[drawn]) for described, (_, drawn) in zip(descriptors, self._drawn, strict=True)
         )
         self.extent_m = cloud_extent_m(self._target.numpy())
+        self._middle = self._target.mean(dim=0)
         self._log_cosine = (of_reference @ of_target.T).clamp_min(1e-4).log()
 
     @cached_property
     def _faces(self) -> tuple[Tensor, Tensor]:
         """Where the drawn points of the reference and of the target face, shapes (N, 3) and (Q, 3); refinement does not ask."""
-        of_reference, of_target = (_as_tensor(outward_normals(views)[drawn]) for views, drawn in self._drawn)
+        of_reference, of_target = (_as_tensor(surface.normals[drawn]) for surface, drawn in self._drawn)
         return of_reference, of_target
 
     def score(self, transforms: Sim3Batch) -> Tensor:
@@ -108,26 +109,24 @@ class DenseAgreement:
     def _soft_matches(self, placed: Tensor, sigma: float) -> tuple[Tensor, Tensor, Tensor]:
         """Points of the reference and of the target, (T, N + Q, 3), and weights, for reference points placed as in `_log_agreement`."""
         log = self._log_agreement(placed, sigma, self.config.refine_power)
-        aims = (log / self.config.temperature).softmax(dim=2) @ self._target
-        starts = (log / self.config.temperature).softmax(dim=1).transpose(1, 2) @ self._reference
-        weights = torch.cat([log.amax(dim=2), log.amax(dim=1)], dim=1).exp()
+        best = log.amax(dim=2), log.amax(dim=1)
+        # One exponential serves both directions; what it rounds to nothing has no weight either.
+        choice = log.sub_(best[0].amax(dim=1)[:, None, None]).div_(self.config.temperature).clamp_min_(LEAST_LOG).exp_()
+        aims = (choice @ self._target) / choice.sum(dim=2, keepdim=True).clamp_min(1e-30)
+        starts = (choice.transpose(1, 2) @ self._reference) / choice.sum(dim=1).unsqueeze(2).clamp_min(1e-30)
         count = len(placed)
         source = torch.cat([self._reference.expand(count, -1, -1), starts], dim=1)
-        return source, torch.cat([aims, self._target.expand(count, -1, -1)], dim=1), weights
+        return source, torch.cat([aims, self._target.expand(count, -1, -1)], dim=1), torch.cat(best, dim=1).exp()
 
     def _log_agreement(self, placed: Tensor, sigma: float, power: float) -> Tensor:
         """Log of exp(−(d/σ)²)·max(0, cosine)^power, shape (T, N, Q), for reference points placed in the target's world, (T, N, 3)."""
-        distance = torch.cdist(placed, self._target.expand(len(placed), -1, -1))
-        return power * self._log_cosine - (distance / (sigma * self.extent_m)) ** 2
-
-
-def _points(views: Sequence[EncodedView]) -> FloatArray:
-    return np.concatenate([view.points_m for view in views])
-
-
-def _draw(views: Sequence[EncodedView], count: int, seed: int) -> NDArray[np.intp]:
-    """Indices of up to `count` random points without outliers, shape (N,)."""
-    return np.random.default_rng(seed).permutation(inliers(_points(views)))[:count]
+        unit_m = sigma * self.extent_m
+        placed, target = (placed - self._middle) / unit_m, (self._target - self._middle) / unit_m
+        ones = torch.ones_like(placed[..., :1])
+        # −(d/σ)² = 2 p·q − p² − q² is one product of vectors of five
+        rows = torch.cat([2 * placed, -(placed**2).sum(dim=-1, keepdim=True), -ones], dim=-1)
+        columns = torch.cat([target, torch.ones(len(target), 1), (target**2).sum(dim=-1, keepdim=True)], dim=-1).T
+        return (rows @ columns).add_(self._log_cosine, alpha=power)
 
 
 def _as_tensor(values: FloatArray) -> Tensor:

@@ -16,6 +16,7 @@ from core.estimators.batched import Sim3Batch, umeyama_batch
 from core.estimators.ransac import sample
 from core.matched_pair import MatchedPair, Pairs
 from core.matches import end_points, pool
+from core.surface import Surface
 from core.viewpoints import angles_deg, consensus
 from core.views import FloatArray
 
@@ -54,7 +55,7 @@ def propose(pair: MatchedPair, config: HypothesesConfig, threshold_m: float, see
         source, aim = end_points(pool(pair.found, pairs), pair.reference, pair.target)
         return _best_samples(source, aim, threshold_m, trials, keep, seed)
 
-    aligned = align_clouds(pair.rotations(ranked[: config.aligned_pairs]), *pair.clouds)
+    aligned = align_clouds(pair.rotations(ranked[: config.aligned_pairs]), *pair.surfaces)
     batches = [fit(pair.best_pairs(), config.pooled_trials, config.pooled)]
     batches += [fit([each], config.single_trials, 1) for each in ranked[: config.single_pairs]]
     batches += [fit(cluster, config.cluster_trials, config.per_cluster) for cluster in _clusters(pair, ranked, config, seed)]
@@ -108,11 +109,11 @@ def _clusters(pair: MatchedPair, ranked: Pairs, config: HypothesesConfig, seed: 
     return clusters
 
 
-def align_clouds(rotations: FloatArray, reference: FloatArray, target: FloatArray) -> Sim3Batch:
+def align_clouds(rotations: FloatArray, reference: Surface, target: Surface) -> Sim3Batch:
     """target_from_reference with the rotations as given, shape (T, 3, 3), and scale and translation such that the clouds' extents and
     medians agree."""
-    size_ratio = cloud_extent_m(target) / max(cloud_extent_m(reference), 1e-9)
-    centers = [torch.from_numpy(np.median(cloud, axis=0)).float() for cloud in (reference, target)]
+    size_ratio = cloud_extent_m(target.points_m) / max(cloud_extent_m(reference.points_m), 1e-9)
+    centers = [torch.from_numpy(np.median(surface.points_m, axis=0)).float() for surface in (reference, target)]
     rotation = torch.from_numpy(rotations).float()
     return Sim3Batch(torch.full((len(rotation),), size_ratio), rotation, centers[1] - size_ratio * (rotation @ centers[0]))
 

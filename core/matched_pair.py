@@ -19,6 +19,7 @@ from core.discriminant import discriminant_directions
 from core.encode import EncodedBurst, EncodedView
 from core.errors import InvalidInput
 from core.matches import Matches
+from core.surface import Surface
 from core.viewpoints import best_reference_per_target, relative_rotations
 from core.views import FloatArray
 
@@ -88,10 +89,9 @@ class MatchedPair:
         """target_from_reference of each view pair, if it showed its objects from the same side, shape (M, N, 3, 3)."""
 
     @cached_property
-    def clouds(self) -> tuple[FloatArray, FloatArray]:
-        """All points of the reference and of the target, each (P, 3)."""
-        of_reference, of_target = (np.concatenate([view.points_m for view in views]) for views in (self.reference, self.target))
-        return of_reference, of_target
+    def surfaces(self) -> tuple[Surface, Surface]:
+        """Of the reference and of the target."""
+        return Surface(self.reference), Surface(self.target)
 
     @cached_property
     def steady_descriptors(self) -> tuple[list[FloatArray], list[FloatArray]]:

@@ -187,7 +187,7 @@ class PoseEstimator:
         try:
             if self.config.solver == "agreement":
                 config = self.config.best.polish or self.config.best.dense
-                agreement = DenseAgreement(pair.reference, pair.target, pair.steady_descriptors, config, seed)
+                agreement = DenseAgreement(*pair.surfaces, pair.steady_descriptors, config, seed)
                 transform = agreement.stretch(estimate.target_from_reference, world_from_object)
             else:
                 transform = axis_scales(estimate, pair, world_from_object, threshold_m)
@@ -205,11 +205,11 @@ class PoseEstimator:
         if not len(guesses):
             raise NoPose("no view pair gives a hypothesis of plausible size; send more views or better depth")
         clock.lap("propose")
-        agreement = DenseAgreement(pair.reference, pair.target, pair.descriptors, config.dense, seed)
+        agreement = DenseAgreement(*pair.surfaces, pair.descriptors, config.dense, seed)
         promising = distinct(guesses, agreement.score(guesses), config.distinct_deg, config.refined)
         clock.lap("score")
         descriptors = pair.steady_descriptors if config.steady else pair.descriptors
-        refined = DenseAgreement(pair.reference, pair.target, descriptors, config.dense, seed).refine(guesses.select(promising))
+        refined = DenseAgreement(*pair.surfaces, descriptors, config.dense, seed).refine(guesses.select(promising))
         views = view_agreement(refined.rotation.numpy(), pair.relative, pair.similarity, config.view_deg)
         weight = min(config.view_weight * len(pair.target), config.most_view_weight)
         scores = agreement.score(refined) * torch.from_numpy(np.exp(weight * views))
@@ -217,7 +217,7 @@ class PoseEstimator:
         clock.lap("refine")
         winner = refined.select(ranked[:1])
         if config.polish is not None:
-            winner = DenseAgreement(pair.reference, pair.target, descriptors, config.polish, seed).refine(winner)
+            winner = DenseAgreement(*pair.surfaces, descriptors, config.polish, seed).refine(winner)
         transform = winner[0]
         clock.lap("polish")
         pairs = pair.best_pairs()

@@ -33,7 +33,7 @@ def by_retrieval(pair: MatchedPair, consensus_deg: float | None, threshold_m: fl
     if consensus_deg is not None:
         agree = near_their_mean(rotations, consensus_deg)
         pairs, rotations = [each for each, kept in zip(pairs, agree) if kept], rotations[agree]
-    transform = align_clouds(mean_rotation(rotations)[None], *pair.clouds)[0]
+    transform = align_clouds(mean_rotation(rotations)[None], *pair.surfaces)[0]
     matches, residual_m = judge(pool(pair.found, pairs), transform, pair, threshold_m)
     clock.lap("views")
     return PoseEstimate(transform, matches, pair.similarity, tuple(pairs), residual_m)

@@ -17,6 +17,7 @@ from core.matches import PoseEstimate
 from core.pose import PoseConfig, PoseEstimator
 from core.reference import Reference
 from core.sim3 import Sim3
+from core.surface import Surface
 from core.views import FloatArray
 
 DENSE = DenseConfig(points=700, sigma=0.1)
@@ -40,7 +41,7 @@ def agreement(reference: Reference, target: EncodedBurst, target_from_reference:
     """
     sides = [[view.trusted_only() for view in views] for views in (reference.views, target.views)]
     described = [_describe(views, whitening) for views in sides]
-    dense = DenseAgreement(sides[0], sides[1], (described[0], described[1]), DENSE, seed=0)
+    dense = DenseAgreement(Surface(sides[0]), Surface(sides[1]), (described[0], described[1]), DENSE, seed=0)
     return float(dense.score(Sim3Batch.of([target_from_reference]))[0])
 
 

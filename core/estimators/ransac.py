@@ -36,13 +36,22 @@ def ransac(source: FloatArray, target: FloatArray, threshold_m: float, seed: int
 
 def sample(source: FloatArray, target: FloatArray, threshold_m: float, trials: int, seed: int) -> tuple[Sim3Batch, Tensor]:
     """Similarities of random samples, the undetermined ones left out, and their inliers, shape (T, K), from shapes (K, 3), K ≥ 4."""
-    chosen = np.random.default_rng(seed).random((trials, len(source))).argpartition(MIN_CORRESPONDENCES - 1, axis=1)
-    chosen = chosen[:, :MIN_CORRESPONDENCES]
+    chosen = _without_repeats(np.random.default_rng(seed), trials, len(source))
     points, aims = torch.from_numpy(source.astype(np.float64)), torch.from_numpy(target.astype(np.float64))
     transforms, determined = umeyama_batch(points[chosen], aims[chosen])
     determined &= (transforms.scale < MAX_SCALE) & (transforms.scale > 1 / MAX_SCALE)
     transforms = transforms.select(determined.nonzero().flatten())
-    return transforms, torch.linalg.norm(transforms.apply(points) - aims, dim=-1) < threshold_m
+    return transforms, transforms.squared_errors(points, aims) < threshold_m**2
+
+
+def _without_repeats(rng: np.random.Generator, trials: int, count: int) -> NDArray[np.intp]:
+    """Samples of MIN_CORRESPONDENCES different numbers below `count`, shape (trials, 4), all as likely (Floyd's algorithm)."""
+    chosen = np.empty((trials, MIN_CORRESPONDENCES), dtype=np.intp)
+    for column, last in enumerate(range(count - MIN_CORRESPONDENCES, count)):
+        drawn = rng.integers(0, last + 1, trials)
+        repeated = (chosen[:, :column] == drawn[:, None]).any(axis=1)
+        chosen[:, column] = np.where(repeated, last, drawn)
+    return chosen
 
 
 def _polish(source: FloatArray, target: FloatArray, transform: Sim3, inlier: NDArray[np.bool_], threshold_m: float) -> RobustFit:

@@ -46,7 +46,7 @@ def test_any_dino_folder_loads(kind: str, patch: int, tmp_path: Path) -> None:
 
 def test_tokens_and_attention_are_the_models_own(tmp_path: Path) -> None:
     """Against transformers' full output with every hidden state and attention."""
-    backbone = load_backbone(str(tiny_folder("dinov2", tmp_path)), layer=1)
+    backbone = load_backbone(str(tiny_folder("dinov2", tmp_path)), layer=1, dtype=torch.float32)
     model = Dinov2Model.from_pretrained(tmp_path, attn_implementation="eager").eval()
     mean, deviation = np.array([0.485, 0.456, 0.406]), np.array([0.229, 0.224, 0.225])
     pixels = torch.from_numpy(((IMAGES / 255 - mean) / deviation).transpose(0, 3, 1, 2)).float()
@@ -62,9 +62,37 @@ def test_tokens_and_attention_are_the_models_own(tmp_path: Path) -> None:
 
 def test_batches_do_not_change_features(tmp_path: Path) -> None:
     folder = tiny_folder("dinov2", tmp_path)
-    whole = load_backbone(str(folder))
+    whole = load_backbone(str(folder), dtype=torch.float32)
     one_by_one = DinoBackbone(Dinov2Model.from_pretrained(folder), "tiny", batch=1)
     assert np.allclose(whole.extract(IMAGES).patches, one_by_one.extract(IMAGES).patches, atol=1e-5)
+
+
+@pytest.mark.parametrize("kind", ["dino", "dinov2", "registers"])
+def test_transparent_patches_take_no_part(kind: str, tmp_path: Path) -> None:
+    backbone = load_backbone(str(tiny_folder(kind, tmp_path)), dtype=torch.float32)
+    patch = backbone.patch_size
+    grid = 112 // patch
+    shown = np.zeros((3, grid, grid), np.uint8)
+    shown[0, 1:4, 2:5], shown[1] = 1, 1
+    alpha = shown.repeat(patch, axis=1).repeat(patch, axis=2)[..., None]
+    found = backbone.extract(np.concatenate([IMAGES, alpha], axis=3))
+    scribbled = np.where(alpha > 0, IMAGES, 255 - IMAGES).astype(np.uint8)
+    again = backbone.extract(np.concatenate([scribbled, alpha], axis=3))
+    assert np.array_equal(found.patches[0], again.patches[0])
+    assert np.array_equal(found.cls, again.cls)
+    assert found.patches[0][shown[0] > 0].any(axis=1).all()
+    assert not found.patches[0][shown[0] == 0].any()
+    assert np.allclose(found.patches[1], backbone.extract(IMAGES).patches[1], atol=1e-5)
+    assert not found.cls[2].any()
+
+
+def test_the_fast_tokens_are_those_of_single_precision(tmp_path: Path) -> None:
+    folder = str(tiny_folder("dinov2", tmp_path))
+    exact, fast = (load_backbone(folder, dtype=dtype) for dtype in (torch.float32, torch.bfloat16))
+    first, second = (backbone.extract(IMAGES).patches for backbone in (exact, fast))
+    cosine = (first * second).sum(axis=-1) / np.linalg.norm(first, axis=-1) / np.linalg.norm(second, axis=-1)
+    assert cosine.min() > 0.99
+    assert exact.fingerprint == fast.fingerprint
 
 
 def test_the_fingerprint_tells_weights_and_layers_apart(tmp_path: Path) -> None:

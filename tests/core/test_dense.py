@@ -19,6 +19,7 @@ from core.normals import outward_normals
 from core.pose import VARIANTS, PoseEstimator
 from core.reference import build_reference
 from core.sim3 import Sim3, rotation_angle_deg
+from core.surface import Surface
 
 from .conftest import PaintedObject
 
@@ -35,7 +36,7 @@ def turned(degrees: float) -> Sim3:
 def agreement(painted: PaintedObject, moved: Sim3) -> DenseAgreement:
     sides = [painted.encode(5, Sim3.identity()).views, painted.encode(4, moved).views]
     described = [[unit(view.descriptors) for view in views] for views in sides]
-    return DenseAgreement(sides[0], sides[1], (described[0], described[1]), DenseConfig(), seed=0)
+    return DenseAgreement(Surface(sides[0]), Surface(sides[1]), (described[0], described[1]), DenseConfig(), seed=0)
 
 
 def test_the_truth_scores_above_turns_of_it(agreement: DenseAgreement, moved: Sim3) -> None:
@@ -105,7 +106,9 @@ def test_a_plate_face_down_does_not_lie_on_one_face_up(moved: Sim3) -> None:
     sides = [plate(Sim3.identity(), 6), plate(moved, 5)]
     described = [[unit(view.descriptors) for view in views] for views in sides]
     over = Sim3(1.0, Rotation.from_euler("x", 180, degrees=True).as_matrix(), np.zeros(3))
-    right, wrong = DenseAgreement(sides[0], sides[1], (described[0], described[1]), DenseConfig(), seed=0).score(batch(moved, moved @ over))
+    right, wrong = DenseAgreement(Surface(sides[0]), Surface(sides[1]), (described[0], described[1]), DenseConfig(), seed=0).score(
+        batch(moved, moved @ over)
+    )
     assert right > 0.5
     assert wrong < 0.1 * right
 
