@@ -1,12 +1,13 @@
-"""Patch correspondences of every reference–target view pair in one batch (paper, "Descriptors and correspondences").
+"""Patch correspondences of reference–target view pairs (paper, "Descriptors and correspondences").
 
 Letters: M reference views, N target views, P and Q their patches after padding, C descriptor size, K correspondences a pair.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 import torch
@@ -25,7 +26,7 @@ class PatchSet:
     places: Tensor
     """Where each patch is, for the cycle's length: grid cells or metres, shape (M, P, 2 or 3)."""
     valid: Tensor
-    """False in the padding, shape (M, P)."""
+    """False in the padding, which comes last, shape (M, P)."""
 
     @staticmethod
     def pad(descriptors: Sequence[NDArray[np.float32]], places: Sequence[NDArray[np.floating]], device: str = "cpu") -> PatchSet:
@@ -58,19 +59,21 @@ class PairMatches:
         return self.similarity.sum(dim=-1)
 
 
-def match(reference: PatchSet, target: PatchSet, count: int, method: str = "cyclical") -> PairMatches:
-    """The `count` best correspondences of every view pair.
+def match(
+    reference: PatchSet, target: PatchSet, count: int, method: str = "cyclical", pairs: Iterable[tuple[int, int]] | None = None
+) -> PairMatches:
+    """The `count` best correspondences of view pairs.
 
     Args:
         method: one of METHODS. `nearest`: each reference patch's nearest target patch, ranked by similarity. `mutual`: only
             pairs that choose each other. `cyclical`: ranked by the distance between a reference patch and where the cycle
             reference → target → reference ends (mutual ones first, at distance 0; Goodwin 2022), ties by similarity; in patches, or
             in metres as the appendix proposes (`cyclical-3d`), depending on `reference.places`.
+        pairs: the (reference view, target view) to match, all where None; others have no correspondences.
     """
-    forward, nearest_target, nearest_reference = _nearest(reference, target)
+    forward, nearest_target, nearest_reference, usable = _nearest(reference, target, pairs)
     cycle_end = nearest_reference.gather(2, nearest_target)
     cost = 1.0 - forward
-    usable = reference.valid[:, None, :] & target.valid.any(dim=1)[None, :, None]
     own = torch.arange(cycle_end.shape[2], device=cycle_end.device)
     if method == "mutual":
         usable = usable & (cycle_end == own)
@@ -90,33 +93,30 @@ def match(reference: PatchSet, target: PatchSet, count: int, method: str = "cycl
     )
 
 
-def _nearest(reference: PatchSet, target: PatchSet) -> tuple[Tensor, Tensor, Tensor]:
-    """Of each reference patch the largest cosine among a target view's patches and which has it, shape (M, N, P), and of each target patch
-    the nearest reference patch, shape (M, N, Q).
+def _nearest(reference: PatchSet, target: PatchSet, pairs: Iterable[tuple[int, int]] | None) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+    """Of each reference patch the largest cosine in a target view, which patch has it, and whether there is one, each (M, N, P); of each
+    target patch the nearest reference patch, (M, N, Q).
 
-    One reference view at a time, whose products stay in the processor's cache. The way back is a second product: cheaper than to search
+    One pair of views at a time, whose product stays in the processor's cache. The way back is a second product: cheaper than to search
     the first one along its slow axis.
     """
-    views, patches = target.valid.shape
-    there = _beside(target.descriptors, _no_choice(target.valid)).flatten(0, 1).T.contiguous()
-    back = _beside(target.descriptors, torch.ones_like(target.valid)).flatten(0, 1)
-    cosine, to_target, to_reference = [], [], []
-    for vectors, valid in zip(reference.descriptors, reference.valid):
-        product = (_beside(vectors, torch.ones_like(valid)) @ there).reshape(len(vectors), views, patches)
-        nearest = _argmax(product)
-        cosine.append(product.gather(2, nearest.unsqueeze(2)).squeeze(2).T)
-        to_target.append(nearest.T)
-        to_reference.append(_argmax(back @ _beside(vectors, _no_choice(valid)).T).reshape(views, patches))
-    return torch.stack(cosine), torch.stack(to_target), torch.stack(to_reference)
-
-
-def _beside(vectors: Tensor, last: Tensor) -> Tensor:
-    return torch.cat([vectors, last.to(vectors.dtype).unsqueeze(-1)], dim=-1)
-
-
-def _no_choice(valid: Tensor) -> Tensor:
-    """What is added to a cosine so that padding is never the nearest."""
-    return torch.where(valid, 0.0, -4.0)
+    (views, patches), (target_views, target_patches) = reference.valid.shape, target.valid.shape
+    device = reference.valid.device
+    cosine = torch.zeros(views, target_views, patches, device=device)
+    to_target = torch.zeros(views, target_views, patches, dtype=torch.long, device=device)
+    to_reference = torch.zeros(views, target_views, target_patches, dtype=torch.long, device=device)
+    usable = torch.zeros_like(cosine, dtype=torch.bool)
+    sizes, target_sizes = reference.valid.sum(dim=1).tolist(), target.valid.sum(dim=1).tolist()
+    for m, n in product(range(views), range(target_views)) if pairs is None else pairs:
+        here, there = reference.descriptors[m, : sizes[m]], target.descriptors[n, : target_sizes[n]]
+        if not (len(here) and len(there)):
+            continue
+        similarity = here @ there.T
+        nearest = _argmax(similarity)
+        to_target[m, n, : len(here)], to_reference[m, n, : len(there)] = nearest, _argmax(there @ here.T)
+        cosine[m, n, : len(here)] = similarity.gather(1, nearest[:, None])[:, 0]
+        usable[m, n, : len(here)] = True
+    return cosine, to_target, to_reference, usable
 
 
 def _argmax(values: Tensor) -> Tensor:

@@ -25,6 +25,8 @@ from core.views import FloatArray
 
 Pairs = list[tuple[int, int]]
 """(reference view, target view)"""
+CANDIDATES = 10
+"""Reference views that a target view is matched with: time then grows with the number of views, and not with that of pairs."""
 STEADY_DIMS = 32
 """Size of the descriptors that change little from view to view."""
 
@@ -82,9 +84,9 @@ class MatchedPair:
         """The backbone's."""
         self.descriptors = _describe(self.reference, reference, dims), _describe(self.target, reference, dims)
         sides = [_patches(views, vectors, method) for views, vectors in zip((self.reference, self.target), self.descriptors)]
-        self.found: PairMatches = match(sides[0], sides[1], correspondences, method)
+        self.found: PairMatches = match(sides[0], sides[1], correspondences, method, _alike(*self.descriptors))
         self.similarity: FloatArray = self.found.view_similarity().numpy()
-        """S, shape (M, N)."""
+        """S, shape (M, N); 0 where views were not matched."""
         self.relative = relative_rotations(self.reference, self.target)
         """target_from_reference of each view pair, if it showed its objects from the same side, shape (M, N, 3, 3)."""
 
@@ -131,6 +133,16 @@ class MatchedPair:
 def _describe(views: Sequence[EncodedView], reference: Described, dims: int | None) -> list[FloatArray]:
     """Unit descriptors of each view's patches, along the reference's first `dims` components."""
     return [unit(view.descriptors if dims is None else reference.basis.project(view.descriptors, dims)) for view in views]
+
+
+def _alike(reference: Sequence[FloatArray], target: Sequence[FloatArray]) -> Pairs:
+    """For every target view the reference views whose mean descriptors are most like its own, CANDIDATES at most."""
+    of_reference, of_target = (
+        unit(np.stack([vectors.sum(axis=0) if len(vectors) else np.zeros(vectors.shape[1]) for vectors in side]))
+        for side in (reference, target)
+    )
+    nearest = np.argsort(-(of_target @ of_reference.T), axis=1, kind="stable")[:, :CANDIDATES]
+    return [(int(m), n) for n, row in enumerate(nearest) for m in row]
 
 
 def _patches(views: Sequence[EncodedView], vectors: Sequence[FloatArray], method: str) -> PatchSet:

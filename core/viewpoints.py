@@ -89,11 +89,18 @@ def view_agreement(rotations: FloatArray, relative: FloatArray, view_similarity:
     Args:
         rotations: target_from_reference, shape (T, 3, 3).
         relative: of `relative_rotations`, shape (M, N, 3, 3).
-        view_similarity: S, shape (M, N).
+        view_similarity: S, shape (M, N); views that were not matched, at 0, say nothing.
     """
-    spread = view_similarity.std(axis=0)
-    standard = (view_similarity - view_similarity.mean(axis=0)) / np.where(spread > 0, spread, 1.0)
+    known = view_similarity > 0
+    standard = np.where(known, view_similarity - _mean(view_similarity, known, 0), 0.0)
+    spread = np.sqrt(_mean(standard**2, known, 0))
+    standard = standard / np.where(spread > 0, spread, 1.0)
     if standard.shape[1] > 1:
-        standard = standard - standard.mean(axis=1, keepdims=True)
-    weights = np.exp(-((angles_deg(rotations, relative.reshape(-1, 3, 3)) / angle_deg) ** 2))
+        standard = np.where(known, standard - _mean(standard, known, 1), 0.0)
+    weights = np.exp(-((angles_deg(rotations, relative.reshape(-1, 3, 3)) / angle_deg) ** 2)) * known.ravel()
     return weights @ standard.ravel() / np.maximum(weights.sum(axis=1), 1e-6)
+
+
+def _mean(values: FloatArray, known: NDArray[np.bool_], axis: int) -> FloatArray:
+    """Of what is known along an axis, which stays; 0 where nothing is."""
+    return np.asarray((values * known).sum(axis=axis, keepdims=True) / np.maximum(known.sum(axis=axis, keepdims=True), 1))

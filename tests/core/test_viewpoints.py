@@ -70,7 +70,7 @@ def test_the_farthest_from_the_mean_leaves_first() -> None:
 def test_a_reference_view_that_is_like_every_target_view_speaks_for_no_rotation(painted: PaintedObject, moved: Sim3) -> None:
     relative = relative_rotations(painted.encode(4, Sim3.identity()).views, painted.encode(4, moved).views)
     half_turn = moved.rotation @ around_z(180)[0]
-    lit = np.eye(4) + np.array([0.0, 5.0, 0.0, 0.0])[:, None]
+    lit = 1 + np.eye(4) + np.array([0.0, 5.0, 0.0, 0.0])[:, None]
     right, wrong = view_agreement(np.stack([moved.rotation, half_turn]), relative, lit, 30)
     assert right > wrong + 0.1
 
