@@ -20,8 +20,10 @@ from core.sim3 import Sim3
 from core.surface import Surface
 from core.views import FloatArray
 
-BATCH = 32
-"""Transforms scored at once; bounds memory at BATCH · N · Q numbers."""
+BATCH = 8
+"""Transforms scored at once: what lies between them stays in the processor's cache."""
+NO_MATCH = 1e6
+"""Log agreement that surfaces lose for each unit of cosine beyond OPPOSITE."""
 LEAST_LOG = -60.0
 """Of a choice; smaller ones would be denormal numbers, which processors are slow with."""
 OPPOSITE = -0.5
@@ -81,8 +83,8 @@ class DenseAgreement:
         parts = []
         for start in range(0, len(transforms), BATCH):
             batch = transforms.select(range(start, min(start + BATCH, len(transforms))))
-            facing = faces_reference @ batch.rotation.transpose(1, 2) @ faces_target.T
-            log = self._log_agreement(batch.apply(self._reference), self.config.sigma, 1.0).masked_fill_(facing < OPPOSITE, -torch.inf)
+            opposite = (faces_reference @ batch.rotation.transpose(1, 2) @ faces_target.T).sub_(OPPOSITE).clamp_max_(0)
+            log = self._log_agreement(batch.apply(self._reference), self.config.sigma, 1.0).add_(opposite, alpha=NO_MATCH)
             parts.append((log.amax(dim=2).exp().mean(dim=1) * log.amax(dim=1).exp().mean(dim=1)).sqrt())
         return torch.cat(parts)
 

@@ -54,9 +54,7 @@ class DinoBackbone:
         self._heads: int = config.num_attention_heads
         self._prefix = 1 + getattr(config, "num_register_tokens", 0)
         self._model: Any = model.eval().requires_grad_(False).to(device)
-        self._decoder: Any = decoder
-        if self._decoder:
-            self._decoder.eval().requires_grad_(False).to(device=device, memory_format=torch.channels_last)
+        self._decoder = decoder.eval().requires_grad_(False).to(device) if decoder else None
         self._blocks = _blocks(model)
         self._layer, self._device, self._dtype, self._batch = min(layer, len(self._blocks) - 1), device, dtype, batch
         self.fingerprint = _fingerprint([model, decoder], whitening, f"{PREPROCESSING}:layer{self._layer}")
