@@ -47,6 +47,8 @@ class EncoderConfig:
     """Patches a side in the close crop; the paper's feature map."""
     context: int | None = 2
     """Patches around what the first pass takes for the object that the second pass sees as well; None shows it the whole crop."""
+    context_step: int = 2
+    """Of the rest of the crop, it sees one patch in so many in both directions: enough to know where the object stands."""
     context_threshold: float = 0.4
     """Foreground probability in the first pass above which the second pass looks closer."""
 
@@ -159,8 +161,8 @@ class Encoder:
         return self.backbone.extract(images)
 
     def _shown(self, view: View, whole: Window, coarse: FloatArray, found: Window | None) -> NDArray[np.uint8]:
-        """Which patches of the close crop the second pass sees, shape (G, G): what may be object, what is near it, and a few more, so
-        that views share passes. Attention is relative to a whole picture, and needs it."""
+        """Which patches of the close crop the second pass sees, shape (G, G): what may be object, what is near it, some of the rest, and
+        a few more, so that views share passes. Attention is relative to a whole picture, and needs it."""
         grid, context = self.config.grid, self.config.context
         shown = np.ones((grid, grid), np.uint8)
         if found is None:
@@ -169,6 +171,7 @@ class Encoder:
             return shown
         soft = found.cut(whole.paste(coarse, view.size) if view.mask is None else view.mask.astype(np.float32), grid)
         away = cv2.distanceTransform((soft <= self.config.context_threshold).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+        away[:: self.config.context_step, :: self.config.context_step] = 0
         count = -(-np.count_nonzero(away <= context) // SHARED) * SHARED
         shown.flat[np.argsort(away, axis=None, kind="stable")[count:]] = 0
         return shown
