@@ -21,7 +21,7 @@ from core.surface import Surface
 from core.views import FloatArray
 
 BATCH = 8
-"""Transforms scored at once: what lies between them stays in the processor's cache."""
+"""Transforms scored or matched at once: what lies between them stays in the processor's cache."""
 NO_MATCH = 1e6
 """Log agreement that surfaces lose for each unit of cosine beyond OPPOSITE."""
 LEAST_LOG = -60.0
@@ -91,7 +91,8 @@ class DenseAgreement:
     def refine(self, transforms: Sim3Batch) -> Sim3Batch:
         """Rounds of weighted least squares on soft matches in both directions."""
         for sigma in self.config.refine_sigmas:
-            refined, determined = umeyama_batch(*self._soft_matches(transforms.apply(self._reference), sigma))
+            matches = [self._soft_matches(part, sigma) for part in transforms.apply(self._reference).split(BATCH)]
+            refined, determined = umeyama_batch(*(torch.cat(parts) for parts in zip(*matches)))
             transforms = refined.where(determined, transforms)
         return transforms
 

@@ -22,7 +22,7 @@ from core.encode import EncodedView
 FloatArray = NDArray[np.floating]
 SAME_POINT = 0.03
 """Patches of different views nearer than this share of the object's extent show one point; about the size of a patch."""
-MOST_PAIRS = 20_000
+MOST_PAIRS = 5000
 """Pairs that the change is measured from; more say nothing new."""
 FEWEST_PAIRS = 2000
 """Fewer pairs than this, of a few hundred directions, are not heard beside an object that has more."""
@@ -37,13 +37,13 @@ def discriminant_directions(objects: Sequence[Sequence[EncodedView]], dims: int)
         objects: views with trusted patches only, of one object each; the variance between points is the first one's, the variance
             within a point the mean over those that show enough points in two views.
     """
-    tokens = np.concatenate([view.descriptors for view in objects[0]]).astype(np.float64)
-    between = np.cov(tokens.T)
+    tokens = np.concatenate([view.descriptors for view in objects[0]])
+    between = np.cov(tokens.T, dtype=np.float32)
     changes = [change for change in map(_change_between_views, objects) if change is not None and len(change) >= FEWEST_PAIRS]
     within = sum((change.T @ change / len(change) / 2 for change in changes), np.zeros_like(between)) / max(len(changes), 1)
-    within += max(SHRINKAGE * float(np.trace(between)) / len(between), 1e-9) * np.eye(len(between))
-    _, vectors = eigh(between, within)
-    return np.ascontiguousarray(vectors[:, ::-1][:, :dims], dtype=np.float32)
+    within += max(SHRINKAGE * float(np.trace(between)) / len(between), 1e-6) * np.eye(len(between), dtype=np.float32)
+    _, vectors = eigh(between, within, subset_by_index=(max(len(between) - dims, 0), len(between) - 1))
+    return np.ascontiguousarray(vectors[:, ::-1], dtype=np.float32)
 
 
 def _change_between_views(views: Sequence[EncodedView]) -> FloatArray | None:
@@ -55,5 +55,5 @@ def _change_between_views(views: Sequence[EncodedView]) -> FloatArray | None:
     pairs = cKDTree(points).query_pairs(SAME_POINT * cloud_extent_m(points), output_type="ndarray")
     pairs = pairs[of_view[pairs[:, 0]] != of_view[pairs[:, 1]]]
     chosen = pairs[np.random.default_rng(0).permutation(len(pairs))[:MOST_PAIRS]]
-    tokens = np.concatenate([view.descriptors for view in views]).astype(np.float64)
+    tokens = np.concatenate([view.descriptors for view in views])
     return np.asarray(tokens[chosen[:, 0]] - tokens[chosen[:, 1]])
