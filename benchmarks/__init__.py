@@ -1,1 +1,3 @@
 """Accuracy, discovery and speed: each benchmark prints a table and writes JSON."""
+
+import core as core  # settles how many threads numpy may use, before numpy is loaded
