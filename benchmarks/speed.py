@@ -10,11 +10,13 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from functools import partial
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
 import torch
 
+from benchmarks import zero_shot_pose
 from benchmarks.parallel import bar
 from benchmarks.tables import print_table, write_json
 from clients.datasets import folders
@@ -22,9 +24,12 @@ from clients.datasets.samples import data_or_samples
 from clients.datasets.sources import find_sequences
 from core.backbones.dino import load_backbone
 from core.backbones.whitening import Whitening
-from core.encode import EncodedBurst, Encoder
+from core.boxes import cloud_extent_m
+from core.depth import complete
+from core.encode import EncodedBurst, Encoder, EncoderConfig
 from core.errors import InvalidInput
 from core.evidence import sample_patches
+from core.matched_pair import MatchedPair
 from core.novelty import BEST, DEFAULT_SCORE, SCORE_NAMES, VERIFIED, Context, DecisionConfig, Member, decide
 from core.pose import VARIANTS, PoseConfig, PoseEstimator
 from core.reference import Reference, build_reference
@@ -49,8 +54,23 @@ class SpeedRow:
     """Share of a whole observation."""
 
 
+@dataclass(frozen=True)
+class TargetRow:
+    """What was aimed at, as a ratio of two operations of the same run, or in milliseconds or megabytes."""
+
+    target: str
+    measured: float
+    bound: str
+
+
 OBSERVATION = ("encode", f"decide {DEFAULT_SCORE}", f"solve {PoseConfig().variant}")
 """The operations that one observation of a known object consists of."""
+STRAIGHTFORWARD = "encode, both passes whole, in single precision"
+PRODUCTS = "products of all patches"
+RECIPE = "solve as zero-shot-pose does"
+GROWING = ("ucd", "best")
+MORE = 3
+COMPONENTS = 32
 COLUMNS = tuple(field.name for field in fields(SpeedRow))
 
 
@@ -69,14 +89,26 @@ def run(
     reference_burst, target_burst = (folders.load_burst(each, range(views)) for each in _two_objects(data_or_samples(data), views))
     network = load_backbone(backbone, device=device)
     encoder = Encoder(network)
+    exact = Encoder(load_backbone(backbone, device=device, dtype=torch.float32), EncoderConfig(context=None))
     scanned, target = encoder.encode(reference_burst), encoder.encode(target_burst)
     reference = build_reference(scanned)
+    many = build_reference(_repeated(scanned)), _repeated(target)
+    pair = MatchedPair(reference, target, COMPONENTS, zero_shot_pose.CORRESPONDENCES, "cyclical")
+    threshold_m = PoseConfig().inlier_ratio * cloud_extent_m(target.cloud_m)
     memory = [Member("reference", scanned.cls, scanned.pooled, sample_patches(scanned))]
     operations: dict[str, Operation] = {"encode": partial(_encode, encoder, target_burst), "learn": partial(_learn, scanned)}
     operations |= {f"decide {score}": partial(_decide, memory, target, score) for score in SCORE_NAMES}
     operations |= {f"decide {BEST}, {VERIFIED} poses": partial(_verify, memory[0], target, reference, network.whitening)}
     operations |= {f"solve {name}": partial(_solve, PoseEstimator(PoseConfig.named(name)), reference, target) for name in VARIANTS}
+    operations |= {_more(name): partial(_solve, PoseEstimator(PoseConfig.named(name)), *many) for name in GROWING}
+    operations |= {
+        STRAIGHTFORWARD: partial(_encode, exact, target_burst),
+        "complete depth, 640 by 480": partial(_complete, np.random.default_rng(0)),
+        PRODUCTS: partial(_without_stages, zero_shot_pose.bare_products, *pair.descriptors),
+        RECIPE: partial(_without_stages, zero_shot_pose.solve, pair, threshold_m, 0),
+    }
     rows = table_rows(_rounds(operations, rounds), OBSERVATION)
+    targets = target_rows(rows, _megabytes(reference))
     if json is not None:
         meta = {
             "benchmark": "speed",
@@ -86,9 +118,25 @@ def run(
             "device": device,
             "threads": torch.get_num_threads(),
         }
-        write_json(json, meta, [asdict(row) for row in rows])
+        write_json(json, meta | {"targets": [asdict(row) for row in targets]}, [asdict(row) for row in rows])
     print_table(f"Speed, {views} + {views} views, {torch.get_num_threads()} threads", [asdict(row) for row in rows], COLUMNS)
+    print_table("Against its bounds", [asdict(row) for row in targets], ("target", "measured", "bound"))
     return rows
+
+
+def target_rows(rows: Sequence[SpeedRow], reference_mb: float) -> list[TargetRow]:
+    """Ratios of the table's totals, with what each should be."""
+    ms = {row.operation: row.ms for row in rows if row.stage == "total"}
+    alone = next(row.ms for row in rows if row.stage == "alone")
+    return [
+        TargetRow("encoding, of the straightforward two passes in single precision", ms["encode"] / ms[STRAIGHTFORWARD], "at most 0.40"),
+        TargetRow("ucd, of the bare products of the same patches", ms["solve ucd"] / ms[PRODUCTS], "at most 3"),
+        TargetRow("the recipe of zero-shot-pose, of ucd", ms[RECIPE] / ms["solve ucd"], "at least 20"),
+        TargetRow("best, ms", ms["solve best"], "at most 150"),
+        *(TargetRow(f"{name}, {MORE} times the views", ms[_more(name)] / ms[f"solve {name}"], "at most 4") for name in GROWING),
+        TargetRow("completing depth, ms", alone, "at most 5"),
+        TargetRow("a reference on disk, MB", reference_mb, "at most 0.5"),
+    ]
 
 
 def table_rows(times: Sequence[dict[str, dict[str, float]]], observation: Sequence[str]) -> list[SpeedRow]:
@@ -103,6 +151,10 @@ def table_rows(times: Sequence[dict[str, dict[str, float]]], observation: Sequen
     }
     whole = sum(medians[name]["total"] for name in observation)
     return [SpeedRow(name, stage, ms, ms / whole) for name, stages in medians.items() for stage, ms in stages.items()]
+
+
+def _more(variant: str) -> str:
+    return f"solve {variant}, {MORE} times the views"
 
 
 def _rounds(operations: dict[str, Operation], rounds: int) -> list[dict[str, dict[str, float]]]:
@@ -143,6 +195,30 @@ def _verify(member: Member, target: EncodedBurst, reference: Reference, whitenin
 
 def _solve(estimator: PoseEstimator, reference: Reference, target: EncodedBurst) -> dict[str, float]:
     return estimator.estimate(reference, target).stage_ms
+
+
+def _complete(rng: np.random.Generator) -> dict[str, float]:
+    depth = rng.uniform(0.5, 1.5, (480, 640)).astype(np.float32)
+    depth[rng.random(depth.shape) < 0.1] = 0
+    started = time.perf_counter()
+    complete(depth)
+    return {"alone": 1000 * (time.perf_counter() - started)}
+
+
+def _without_stages(function: Callable[..., object], *arguments: object) -> dict[str, float]:
+    function(*arguments)
+    return {}
+
+
+def _repeated(encoded: EncodedBurst) -> EncodedBurst:
+    """MORE times the views: the same again, which takes as long as others would."""
+    return encoded.select(list(range(len(encoded.views))) * MORE)
+
+
+def _megabytes(reference: Reference) -> float:
+    file = BytesIO()
+    np.savez(file, allow_pickle=False, **reference.as_arrays())
+    return len(file.getvalue()) / 1e6
 
 
 def _two_objects(data: Path, views: int) -> list[folders.Sequence]:

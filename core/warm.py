@@ -19,6 +19,7 @@ from core.estimators.batched import Sim3Batch
 from core.matched_pair import require_comparable
 from core.reference import Reference
 from core.sim3 import Sim3, rotation_angle_deg
+from core.surface import Surface
 from core.viewpoints import relative_rotations
 from core.views import FloatArray
 
@@ -86,7 +87,7 @@ def _agreement(reference: Reference, target: EncodedBurst, pose: Sim3, config: W
     if not all(sides):
         return None
     described = [[_describe(view, reference, config.dims) for view in views] for views in sides]
-    return DenseAgreement(sides[0], sides[1], (described[0], described[1]), config.dense, seed)
+    return DenseAgreement(Surface(sides[0]), Surface(sides[1]), (described[0], described[1]), config.dense, seed)
 
 
 def _describe(view: EncodedView, reference: Reference, dims: int) -> FloatArray:

@@ -18,7 +18,7 @@ def test_medians_and_ratios() -> None:
 
 
 def test_every_stage_is_timed(recorded: Path, monkeypatch: pytest.MonkeyPatch, backbone) -> None:
-    monkeypatch.setattr(speed, "load_backbone", lambda name, device: backbone)
+    monkeypatch.setattr(speed, "load_backbone", lambda name, device, dtype=None: backbone)
     rows = speed.run(None, data=recorded, views=4, rounds=1)
     totals = {row.operation for row in rows if row.stage == "total"}
     assert {"encode", "learn", "decide best, 3 poses", *(f"solve {variant}" for variant in VARIANTS)} <= totals
@@ -28,3 +28,18 @@ def test_every_stage_is_timed(recorded: Path, monkeypatch: pytest.MonkeyPatch, b
 def test_two_objects_with_enough_views_are_needed(recorded: Path) -> None:
     with pytest.raises(InvalidInput, match="5 views"):
         speed.run(None, data=recorded, views=5)
+
+
+def test_bounds_are_compared_with_ratios_of_the_same_run() -> None:
+    ms = {
+        "encode": 40.0,
+        speed.STRAIGHTFORWARD: 100.0,
+        "solve ucd": 6.0,
+        speed.PRODUCTS: 2.0,
+        speed.RECIPE: 60.0,
+        "solve best": 90.0,
+        "solve ucd, 3 times the views": 12.0,
+        "solve best, 3 times the views": 135.0,
+    }
+    rows = [speed.SpeedRow(name, "total", each, 0.0) for name, each in ms.items()] + [speed.SpeedRow("complete depth", "alone", 4.5, 0.0)]
+    assert [row.measured for row in speed.target_rows(rows, 2.5)] == [0.4, 3.0, 10.0, 90.0, 2.0, 1.5, 4.5, 2.5]
