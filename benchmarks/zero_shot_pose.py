@@ -20,7 +20,7 @@ CORRESPONDENCES = 50
 TRIALS = 1000
 
 
-class Similarity(SimilarityTransform):  # type: ignore[misc]
+class Similarity(SimilarityTransform):
     """Of space: scikit-image makes an empty transform before it fits one, of the plane unless told otherwise."""
 
     def __init__(self, matrix: FloatArray | None = None, *, dimensionality: int = 3) -> None:

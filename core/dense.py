@@ -91,7 +91,7 @@ class DenseAgreement:
     def refine(self, transforms: Sim3Batch) -> Sim3Batch:
         """Rounds of weighted least squares on soft matches in both directions."""
         for sigma in self.config.refine_sigmas:
-            matches = [self._soft_matches(part, sigma) for part in transforms.apply(self._reference).split(BATCH)]
+            matches = [self._soft_matches(part, sigma) for part in torch.split(transforms.apply(self._reference), BATCH)]
             refined, determined = umeyama_batch(*(torch.cat(parts) for parts in zip(*matches)))
             transforms = refined.where(determined, transforms)
         return transforms

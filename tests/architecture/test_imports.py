@@ -45,7 +45,7 @@ FOREIGN = {
 """Libraries that are another package's business."""
 RAYCAST = "clients.simulator.raycast"
 """The rendered world: the one part of clients/ that casts rays, with Open3D."""
-DISTRIBUTIONS = {"PIL": "pillow", "cv2": "opencv-python-headless", "open3d": "open3d-cpu", "yaml": "pyyaml"}
+DISTRIBUTIONS = {"PIL": "pillow", "cv2": "opencv-python-headless", "open3d": "open3d-cpu", "yaml": "pyyaml", "skimage": "scikit-image"}
 """Of libraries that are imported under another name than they are installed."""
 FILE_CALLS = {
     "open",
