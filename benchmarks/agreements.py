@@ -47,6 +47,7 @@ SOURCES = (
     "pose.py",
     "reference.py",
     "sim3.py",
+    "surface.py",
     "verification.py",
     "viewpoints.py",
 )
