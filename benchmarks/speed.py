@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from benchmarks import zero_shot_pose
+from benchmarks import speed_plot, zero_shot_pose
 from benchmarks.parallel import bar
 from benchmarks.tables import print_table, write_json
 from clients.datasets import folders
@@ -81,6 +81,7 @@ def run(
     rounds: int = 5,
     backbone: str = "dinov2-s14",
     device: str = "cpu",
+    plot: Path | None = None,
 ) -> list[SpeedRow]:
     """Times one observation of `views` views of an object of `data` (the samples where None) against a reference of as many.
 
@@ -119,6 +120,8 @@ def run(
             "threads": torch.get_num_threads(),
         }
         write_json(json, meta | {"targets": [asdict(row) for row in targets]}, [asdict(row) for row in rows])
+    if plot is not None:
+        speed_plot.plot(plot, _waterfall(rows), f"{views} views against a reference of {views}, {torch.get_num_threads()} threads")
     print_table(f"Speed, {views} + {views} views, {torch.get_num_threads()} threads", [asdict(row) for row in rows], COLUMNS)
     print_table("Against its bounds", [asdict(row) for row in targets], ("target", "measured", "bound"))
     return rows
@@ -137,6 +140,17 @@ def target_rows(rows: Sequence[SpeedRow], reference_mb: float) -> list[TargetRow
         TargetRow("completing depth, ms", alone, "at most 5"),
         TargetRow("a reference on disk, MB", reference_mb, "at most 0.5"),
     ]
+
+
+def _waterfall(rows: Sequence[SpeedRow]) -> list[tuple[str, float, float]]:
+    """Stages of an observation in order, with the straightforward encoder's beside them."""
+    ms = {(row.operation, row.stage): row.ms for row in rows}
+    found = []
+    for operation in OBSERVATION:
+        for stage in [stage for each, stage in ms if each == operation and stage != "total"] or ["total"]:
+            other = ms.get((STRAIGHTFORWARD, stage)) if operation == OBSERVATION[0] else None
+            found.append((f"{operation}, {stage}", ms[operation, stage], other or float("nan")))
+    return found
 
 
 def table_rows(times: Sequence[dict[str, dict[str, float]]], observation: Sequence[str]) -> list[SpeedRow]:

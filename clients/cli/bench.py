@@ -99,12 +99,13 @@ def speed(
     rounds: Annotated[int, typer.Option(min=1, help="Times each operation is timed.")] = 5,
     backbone: Backbone = BACKBONE,
     device: Annotated[str, typer.Option(help="Torch device.")] = "cpu",
+    plot: Annotated[Path | None, typer.Option(help="File for the stages, .png or .svg.")] = None,
     json: JsonFile = None,
 ) -> None:
     """Time of every stage of an observation."""
     from benchmarks.speed import run
 
-    run(json, data, views, rounds, backbone, device)
+    run(json, data, views, rounds, backbone, device, plot)
 
 
 @app.command()
