@@ -42,7 +42,7 @@ class CentreBackbone:
         """See `Backbone.extract`."""
         views, side = images.shape[:2]
         grid = side // self.patch_size
-        blocks = images.reshape(views, grid, self.patch_size, grid, self.patch_size, 3).swapaxes(2, 3)
+        blocks = images[..., :3].reshape(views, grid, self.patch_size, grid, self.patch_size, 3).swapaxes(2, 3)
         tokens = (blocks.reshape(views, grid, grid, self.dim) / np.float32(255)).astype(np.float32)
         disc = np.zeros((side, side), np.float32)
         cv2.circle(disc, (side // 2, side // 2), round(0.35 * side), 1.0, -1)
