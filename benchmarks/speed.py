@@ -70,7 +70,6 @@ PRODUCTS = "products of all patches"
 RECIPE = "solve as zero-shot-pose does"
 GROWING = ("ucd", "best")
 MORE = 3
-COMPONENTS = 32
 COLUMNS = tuple(field.name for field in fields(SpeedRow))
 
 
@@ -94,7 +93,9 @@ def run(
     scanned, target = encoder.encode(reference_burst), encoder.encode(target_burst)
     reference = build_reference(scanned)
     many = build_reference(_repeated(scanned)), _repeated(target)
-    pair = MatchedPair(reference, target, COMPONENTS, zero_shot_pose.CORRESPONDENCES, "cyclical")
+    reduced, whole = (
+        MatchedPair(reference, target, dims, zero_shot_pose.CORRESPONDENCES, "cyclical") for dims in (PoseConfig().dims, None)
+    )
     threshold_m = PoseConfig().inlier_ratio * cloud_extent_m(target.cloud_m)
     memory = [Member("reference", scanned.cls, scanned.pooled, sample_patches(scanned))]
     operations: dict[str, Operation] = {"encode": partial(_encode, encoder, target_burst), "learn": partial(_learn, scanned)}
@@ -105,8 +106,8 @@ def run(
     operations |= {
         STRAIGHTFORWARD: partial(_encode, exact, target_burst),
         "complete depth, 640 by 480": partial(_complete, np.random.default_rng(0)),
-        PRODUCTS: partial(_without_stages, zero_shot_pose.bare_products, *pair.descriptors),
-        RECIPE: partial(_without_stages, zero_shot_pose.solve, pair, threshold_m, 0),
+        PRODUCTS: partial(_without_stages, zero_shot_pose.bare_products, *reduced.descriptors),
+        RECIPE: partial(_without_stages, zero_shot_pose.solve, whole, threshold_m, 0),
     }
     rows = table_rows(_rounds(operations, rounds), OBSERVATION)
     targets = target_rows(rows, _megabytes(reference))

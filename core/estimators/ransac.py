@@ -31,7 +31,7 @@ def ransac(source: FloatArray, target: FloatArray, threshold_m: float, seed: int
     best = int(inliers.sum(dim=1).argmax())
     if inliers[best].sum() < MIN_CORRESPONDENCES:
         raise NoPose(f"no {MIN_CORRESPONDENCES} of {len(source)} correspondences agree on a transform; are these objects of one kind?")
-    return _polish(source, target, trials[best], inliers[best].numpy(), threshold_m)
+    return polish(source, target, trials[best], inliers[best].numpy(), threshold_m)
 
 
 def sample(source: FloatArray, target: FloatArray, threshold_m: float, trials: int, seed: int) -> tuple[Sim3Batch, Tensor]:
@@ -54,15 +54,22 @@ def _without_repeats(rng: np.random.Generator, trials: int, count: int) -> NDArr
     return chosen
 
 
-def _polish(source: FloatArray, target: FloatArray, transform: Sim3, inlier: NDArray[np.bool_], threshold_m: float) -> RobustFit:
-    """Least squares on the inliers while that does not lose inliers."""
+def polish(source: FloatArray, target: FloatArray, transform: Sim3, inlier: NDArray[np.bool_], threshold_m: float) -> RobustFit:
+    """Least squares on the inliers while that lowers the squared errors, each of at most the threshold's: a transform that is bent to
+    reach one more inlier has more of them, and is worse."""
+
+    def errors_of(transform: Sim3) -> FloatArray:
+        return np.asarray(np.linalg.norm(transform.apply(source) - target, axis=1))
+
+    cost = (np.minimum(errors_of(transform), threshold_m) ** 2).sum()
     for _ in range(REFITS):
         try:
             refined = umeyama(source[inlier], target[inlier])
         except NoPose:
             break
-        again = np.linalg.norm(refined.apply(source) - target, axis=1) < threshold_m
-        if again.sum() < inlier.sum():
+        errors = errors_of(refined)
+        lower = (np.minimum(errors, threshold_m) ** 2).sum()
+        if lower >= cost:
             break
-        transform, inlier = refined, again
+        transform, inlier, cost = refined, errors < threshold_m, lower
     return refit(source, target, transform, inlier)

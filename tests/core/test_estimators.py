@@ -11,6 +11,7 @@ from core.errors import NoPose, Unavailable
 from core.estimators.base import Estimator
 from core.estimators.colmap import lo_ransac
 from core.estimators.named import ESTIMATORS
+from core.estimators.ransac import polish
 from core.sim3 import Sim3
 
 
@@ -34,6 +35,15 @@ def test_sixty_percent_outliers(moved: Sim3, fitted_by: Estimator) -> None:
     assert fit.inlier[:80].all()
     assert fit.inlier[80:].mean() < 0.1
     assert fit.residual_m < 0.01
+
+
+def test_a_fit_that_is_off_everywhere_to_reach_one_more_inlier_is_not_kept(moved: Sim3) -> None:
+    source, target = problem(moved, 60, 0)
+    target[0, 0] += 0.25
+    bent = Sim3(moved.scale, moved.rotation, moved.translation + np.array([0.1, 0, 0]))
+    fit = polish(source, target, bent, np.ones(60, dtype=bool), threshold_m=0.2)
+    assert np.allclose(fit.target_from_reference.as_matrix(), moved.as_matrix(), atol=1e-6)
+    assert fit.inlier.tolist() == [False] + [True] * 59
 
 
 def test_the_same_seed_gives_the_same_answer(moved: Sim3, fitted_by: Estimator) -> None:

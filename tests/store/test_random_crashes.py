@@ -36,7 +36,7 @@ from store.sweep import FOLDERS
 from tests.faults import Crash, Disk, tapped
 
 LEAST_CRASHES = 200
-EXAMPLES, STEPS = 20, 30
+EXAMPLES, STEPS = 30, 30
 KEPT = 4
 """Observations, so that the oldest are dropped all the time."""
 CALLS = {
