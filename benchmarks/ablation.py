@@ -29,7 +29,7 @@ CHANGES = {
     "refined by principal components": replace(_BEST, steady=False),
     "no agreement of view pairs": replace(_BEST, view_weight=0.0),
     "one hypothesis refined": replace(_BEST, refined=1),
-    "no hypotheses of aligned pairs": replace(_BEST, hypotheses=replace(_GUESSES, aligned_pairs=1)),
+    "no hypotheses of single pairs": replace(_BEST, hypotheses=replace(_GUESSES, single_pairs=0, aligned_pairs=1)),
     "no hypotheses of clusters": replace(_BEST, hypotheses=replace(_GUESSES, clusters=0)),
     "no polish": replace(_BEST, polish=None),
     ORACLE: replace(_BEST, alternatives=_BEST.refined, alternative_deg=_BEST.distinct_deg),

@@ -45,8 +45,9 @@ class EncoderConfig:
     """Patches a side in the first pass: 224 px at 14 px a patch."""
     grid: int = 28
     """Patches a side in the close crop; the paper's feature map."""
-    context: int | None = 2
-    """Patches around what the first pass takes for the object that the second pass sees as well; None shows it the whole crop."""
+    context: int | None = None
+    """Patches around what the first pass takes for the object that the second pass sees as well; None shows it the whole crop, which takes
+    longer and finds more poses where views are few."""
     context_step: int = 2
     """Of the rest of the crop, it sees one patch in so many in both directions: enough to know where the object stands."""
     context_threshold: float = 0.4

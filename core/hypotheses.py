@@ -1,4 +1,4 @@
-"""Many guesses of the transform, so that one of them is right: pooled, by consensus cluster, by alignment.
+"""Many guesses of the transform, so that one of them is right: pooled, by consensus cluster, by view pair, by alignment.
 
 Letters: M reference views, N target views, T transforms.
 """
@@ -28,6 +28,9 @@ class HypothesesConfig:
     pooled: int = 9
     """From the correspondences of every target view's best reference view."""
     pooled_trials: int = 1500
+    single_pairs: int = 16
+    """View pairs, the most similar first, each of which makes a guess alone: what a target with one or two views lives on."""
+    single_trials: int = 200
     clustered_pairs: int = 30
     """The most similar pairs, split into sets that agree on a rotation."""
     clusters: int = 4
@@ -54,6 +57,7 @@ def propose(pair: MatchedPair, config: HypothesesConfig, threshold_m: float, see
 
     aligned = align_clouds(pair.rotations(ranked[: config.aligned_pairs]), *pair.surfaces)
     batches = [fit(pair.best_pairs(), config.pooled_trials, config.pooled)]
+    batches += [fit([each], config.single_trials, 1) for each in ranked[: config.single_pairs]]
     batches += [fit(cluster, config.cluster_trials, config.per_cluster) for cluster in _clusters(pair, ranked, config, seed)]
     together = Sim3Batch.concatenate([*batches, aligned])
     off = together.scale / aligned.scale[0]
