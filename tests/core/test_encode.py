@@ -51,6 +51,14 @@ def test_the_object_is_found_without_its_mask(foreground: str, backbone: DinoBac
     assert len(found.cells) * (found.window.size / found.grid) ** 2 > 0.6 * mask.sum(), "and cover most of it"
 
 
+def test_a_second_pass_that_sees_less_finds_the_same_object(backbone: DinoBackbone, burst: Burst, encoded: EncodedBurst) -> None:
+    near = Encoder(backbone, EncoderConfig(context=2)).encode(burst)
+    for view, whole in zip(near.views, encoded.views):
+        assert view.window == whole.window
+        both = {tuple(cell) for cell in view.cells} & {tuple(cell) for cell in whole.cells}
+        assert len(both) > 0.9 * max(len(view.cells), len(whole.cells))
+
+
 def test_points_lie_on_the_object(encoded: EncodedBurst, sequence: Sequence) -> None:
     assert sequence.world_from_model is not None
     in_model = sequence.world_from_model.inverse().apply(encoded.cloud_m)
