@@ -23,7 +23,7 @@ def plot(file: Path, stages: Sequence[tuple[str, float, float]], title: str) -> 
         start += ms
     axes.invert_yaxis()
     axes.set(yticks=[], xlabel="milliseconds", title=title)
-    axes.set_xlim(0, 1.3 * start)
-    axes.legend(loc="lower right")
+    axes.set_xlim(0, 1.8 * start)
+    axes.legend(loc="lower left")
     figure.savefig(file, dpi=110)
     pyplot.close(figure)
