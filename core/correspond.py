@@ -1,6 +1,6 @@
 """Patch correspondences of reference–target view pairs (paper, "Descriptors and correspondences").
 
-Letters: M reference views, N target views, P and Q their patches after padding, C descriptor size, K correspondences a pair.
+Letters: M reference views, N target views, P_m patches of a view, P and Q the most of any, C descriptor size, K correspondences a pair.
 """
 
 from __future__ import annotations
@@ -11,34 +11,29 @@ from itertools import product
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
+
+from core.views import FloatArray
 
 METHODS = ("nearest", "mutual", "cyclical", "cyclical-3d")
 
 
 @dataclass(frozen=True, eq=False)
 class PatchSet:
-    """The patches of several views, padded to the same number."""
+    """The patches of several views."""
 
-    descriptors: Tensor
-    """Unit vectors, zero in the padding, shape (M, P, C)."""
+    descriptors: Sequence[FloatArray]
+    """Unit vectors, one array a view, shape (P_m, C)."""
     places: Tensor
-    """Where each patch is, for the cycle's length: grid cells or metres, shape (M, P, 2 or 3)."""
-    valid: Tensor
-    """False in the padding, which comes last, shape (M, P)."""
+    """Where each patch is, for the cycle's length: grid cells or metres, shape (M, P, 2 or 3); P is the largest P_m, at least 1."""
 
     @staticmethod
-    def pad(descriptors: Sequence[NDArray[np.float32]], places: Sequence[NDArray[np.floating]], device: str = "cpu") -> PatchSet:
+    def of(descriptors: Sequence[FloatArray], places: Sequence[FloatArray]) -> PatchSet:
         """From one array a view, shapes (P_m, C) and (P_m, 2 or 3)."""
-        longest = max(max(len(each) for each in descriptors), 1)
-        shape = (len(descriptors), longest)
-        padded = np.zeros((*shape, descriptors[0].shape[1]), dtype=np.float32)
-        padded_places = np.zeros((*shape, places[0].shape[1]), dtype=np.float32)
-        valid = np.zeros(shape, dtype=bool)
-        for view, (vectors, where) in enumerate(zip(descriptors, places)):
-            padded[view, : len(vectors)], padded_places[view, : len(vectors)], valid[view, : len(vectors)] = vectors, where, True
-        return PatchSet(*(torch.from_numpy(array).to(device) for array in (padded, padded_places, valid)))
+        padded = torch.zeros(len(places), max(1, *map(len, places)), places[0].shape[1])
+        for view, where in enumerate(places):
+            padded[view, : len(where)] = torch.from_numpy(where)
+        return PatchSet(descriptors, padded)
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,11 +69,11 @@ def match(
     forward, nearest_target, nearest_reference, usable = _nearest(reference, target, pairs)
     cycle_end = nearest_reference.gather(2, nearest_target)
     cost = 1.0 - forward
-    own = torch.arange(cycle_end.shape[2], device=cycle_end.device)
+    own = torch.arange(cycle_end.shape[2])
     if method == "mutual":
         usable = usable & (cycle_end == own)
     elif method.startswith("cyclical"):
-        rows = torch.arange(len(reference.places), device=own.device)[:, None, None]
+        rows = torch.arange(len(reference.places))[:, None, None]
         moved = torch.linalg.norm(reference.places[rows, cycle_end] - reference.places[:, None], dim=-1)
         cost = cost * TIE_BREAK + moved
     cost = cost.masked_fill(~usable, torch.inf)
@@ -100,17 +95,13 @@ def _nearest(reference: PatchSet, target: PatchSet, pairs: Iterable[tuple[int, i
     One pair of views at a time, by numpy, whose product stays in the processor's cache and whose search along rows is the quickest. The
     way back is a second product: cheaper than a search along columns.
     """
-    (views, patches), (target_views, target_patches) = reference.valid.shape, target.valid.shape
+    (views, patches), (target_views, target_patches) = reference.places.shape[:2], target.places.shape[:2]
     cosine = np.zeros((views, target_views, patches), dtype=np.float32)
     to_target = np.zeros((views, target_views, patches), dtype=np.int64)
     to_reference = np.zeros((views, target_views, target_patches), dtype=np.int64)
     usable = np.zeros(cosine.shape, dtype=bool)
-    of_reference, of_target = (
-        [vectors[:size] for vectors, size in zip(side.descriptors.cpu().numpy(), side.valid.sum(dim=1).tolist())]
-        for side in (reference, target)
-    )
     for m, n in product(range(views), range(target_views)) if pairs is None else pairs:
-        here, there = of_reference[m], of_target[n]
+        here, there = reference.descriptors[m], target.descriptors[n]
         if not (len(here) and len(there)):
             continue
         similarity = here @ there.T
@@ -118,8 +109,7 @@ def _nearest(reference: PatchSet, target: PatchSet, pairs: Iterable[tuple[int, i
         to_target[m, n, : len(here)], to_reference[m, n, : len(there)] = nearest, (there @ here.T).argmax(axis=1)
         cosine[m, n, : len(here)] = similarity[np.arange(len(here)), nearest]
         usable[m, n, : len(here)] = True
-    found = [torch.from_numpy(each).to(reference.valid.device) for each in (cosine, to_target, to_reference, usable)]
-    return found[0], found[1], found[2], found[3]
+    return torch.from_numpy(cosine), torch.from_numpy(to_target), torch.from_numpy(to_reference), torch.from_numpy(usable)
 
 
 TIE_BREAK = 1e-3

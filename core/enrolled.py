@@ -35,8 +35,8 @@ ADAPTED_FROM = 256
 """Members, evenly spaced, whose patches a larger memory is adapted to; more say nothing new."""
 GROWTH = 1.25
 """Factor by which a larger memory grows until it is adapted anew, which all comparisons kept so far are lost by."""
-KEPT = 1024
-"""Members whose patches stay in memory, those compared last: up to 200 MB of ten views each, in half precision."""
+KEPT = 512
+"""Members whose patches stay in memory, those compared last: up to 200 MB of ten views each."""
 KEPT_COHORTS = 4096
 """Members whose matches with founders stay in memory: about 10 MB."""
 
@@ -121,16 +121,17 @@ class Enrolled:
         return Comparison(matches, of_founders, cohorts, prior)
 
     def _cohorts_of(self, places: Sequence[int]) -> list[dict[str, float]]:
-        """For each of some members its matches with founders, by category."""
-        return [self._cohort(place, founders) for place, founders in zip(places, self._founders_near(places))]
-
-    def _cohort(self, place: int, founders: Sequence[int]) -> dict[str, float]:
-        members = self._near.members
-        known = self._cohorts.keep(members[place].id, self._cohorts.get(members[place].id, {}))
-        missing = [each for each in founders if members[each].id not in known]
-        (own,) = self._prepared([place])
-        known.update(zip((members[each].id for each in missing), match_views(own, self._prepared(missing)).tolist()))
-        return {members[each].category_id: known[members[each].id] for each in founders}
+        """For each of some members its matches with founders, by category. Founders are compared once; their patches are not kept."""
+        members, near = self._near.members, self._founders_near(places)
+        known = [self._cohorts.keep(members[place].id, self._cohorts.get(members[place].id, {})) for place in places]
+        missing = [[each for each in founders if members[each].id not in of_one] for founders, of_one in zip(near, known)]
+        wanted = sorted({each for some in missing for each in some})
+        patches = dict(zip(wanted, self._prepared(wanted, keep=False)))
+        for place, of_one, some in zip(places, known, missing):
+            if some:
+                matches = match_views(self._prepared([place])[0], [patches[each] for each in some])
+                of_one.update(zip((members[each].id for each in some), matches.tolist()))
+        return [{members[each].category_id: of_one[members[each].id] for each in founders} for founders, of_one in zip(near, known)]
 
     def _founders_near(self, places: Sequence[int]) -> list[list[int]]:
         if self.exact:
@@ -141,16 +142,18 @@ class Enrolled:
             self._neighbours.update(zip(missing, (founders for _, founders in found)))
         return [self._neighbours[place] for place in places]
 
-    def _prepared(self, places: Sequence[int]) -> list[Tensor]:
+    def _prepared(self, places: Sequence[int], *, keep: bool = True) -> list[Tensor]:
         """Unit patches of some members, adapted to the memory. Raises _DamagedError."""
         ids = [self._near.members[place].id for place in places]
         there = {each: self._patches[each] for each in ids if each in self._patches}
         missing = [each for each in ids if each not in there]
         if missing:
             read = self._read(missing)
-            directions = self._directions([read[each] for each in missing])
-            there.update(zip(missing, directions if self.exact else [each.half() for each in directions]))
-        return [self._patches.keep(each, there[each]).float() for each in ids]
+            there.update(zip(missing, self._directions([read[each] for each in missing])))
+        if keep:
+            for each in ids:
+                self._patches.keep(each, there[each])
+        return [there[each] for each in ids]
 
     def _read(self, ids: Sequence[str]) -> Mapping[str, FloatArray]:
         read = self._source.patches(ids) if ids else {}

@@ -97,8 +97,9 @@ def match_views(target: Tensor, others: Sequence[Tensor]) -> FloatArray:
     found: list[float] = []
     for start in range(0, len(others), BATCH):
         batch = others[start : start + BATCH]
-        cosines = torch.einsum("vkd,wld->vwkl", target, torch.cat(list(batch)))
-        views = (cosines.amax(dim=3).mean(dim=2) + cosines.amax(dim=2).mean(dim=2)) / 2
+        cosines = (target.flatten(0, 1) @ torch.cat(list(batch)).flatten(0, 1).T).unflatten(1, (-1, batch[0].shape[1]))
+        cosines = cosines.unflatten(0, target.shape[:2])
+        views = (cosines.amax(dim=3).mean(dim=1) + cosines.amax(dim=1).mean(dim=2)) / 2
         for each in torch.split(views, [len(other) for other in batch], dim=1):
             found.append(float((each.amax(dim=0).mean() + each.amax(dim=1).mean()) / 2))
     return np.array(found)

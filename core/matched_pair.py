@@ -82,7 +82,7 @@ class MatchedPair:
         self._basis = reference.basis
         self.fingerprint = reference.fingerprint
         """The backbone's."""
-        self.descriptors = _describe(self.reference, reference, dims), _describe(self.target, reference, dims)
+        self.descriptors = describe(self.reference, reference, dims), describe(self.target, reference, dims)
         sides = [_patches(views, vectors, method) for views, vectors in zip((self.reference, self.target), self.descriptors)]
         self.found: PairMatches = match(sides[0], sides[1], correspondences, method, _alike(*self.descriptors))
         self.similarity: FloatArray = self.found.view_similarity().numpy()
@@ -130,7 +130,7 @@ class MatchedPair:
         return np.array([self.similarity[each] for each in pairs])
 
 
-def _describe(views: Sequence[EncodedView], reference: Described, dims: int | None) -> list[FloatArray]:
+def describe(views: Sequence[EncodedView], reference: Described, dims: int | None) -> list[FloatArray]:
     """Unit descriptors of each view's patches, along the reference's first `dims` components."""
     return [unit(view.descriptors if dims is None else reference.basis.project(view.descriptors, dims)) for view in views]
 
@@ -147,4 +147,4 @@ def _alike(reference: Sequence[FloatArray], target: Sequence[FloatArray]) -> Pai
 
 def _patches(views: Sequence[EncodedView], vectors: Sequence[FloatArray], method: str) -> PatchSet:
     places = [view.points_m if method == "cyclical-3d" else view.cells.astype(np.float32) for view in views]
-    return PatchSet.pad(vectors, places)
+    return PatchSet.of(vectors, places)

@@ -13,15 +13,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from core.dense import DenseAgreement, DenseConfig
-from core.descriptors import unit
-from core.encode import EncodedBurst, EncodedView
+from core.encode import EncodedBurst
 from core.estimators.batched import Sim3Batch
-from core.matched_pair import require_comparable
+from core.matched_pair import describe, require_comparable
 from core.reference import Reference
 from core.sim3 import Sim3, rotation_angle_deg
 from core.surface import Surface
 from core.viewpoints import relative_rotations
-from core.views import FloatArray
 
 
 @dataclass(frozen=True)
@@ -86,9 +84,5 @@ def _agreement(reference: Reference, target: EncodedBurst, pose: Sim3, config: W
     ]
     if not all(sides):
         return None
-    described = [[_describe(view, reference, config.dims) for view in views] for views in sides]
-    return DenseAgreement(Surface(sides[0]), Surface(sides[1]), (described[0], described[1]), config.dense, seed)
-
-
-def _describe(view: EncodedView, reference: Reference, dims: int) -> FloatArray:
-    return unit(reference.basis.project(view.descriptors, min(dims, reference.basis.components.shape[1])))
+    descriptors = describe(sides[0], reference, config.dims), describe(sides[1], reference, config.dims)
+    return DenseAgreement(Surface(sides[0]), Surface(sides[1]), descriptors, config.dense, seed)

@@ -3,31 +3,23 @@
 from __future__ import annotations
 
 import multiprocessing
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-import httpx
-
 from clients.errors import Unreachable
-
-HOST = "127.0.0.1"
-START_S = 300.0
-POLL_S = 0.2
-STOP_S = 10.0
+from clients.simulator.local_service import HOST, STOP_S, becomes_ready, free_port
 
 
 @contextmanager
 def serve(memory: Path, grid: int, warm: bool) -> Iterator[str]:
     """The address of a service that is stopped on leaving. Raises Unreachable where it does not start."""
-    from clients.simulator.local_service import free_port
-
     port = free_port()
     process = multiprocessing.get_context("spawn").Process(target=_serve, args=(memory, grid, warm, port), daemon=True)
     process.start()
     try:
-        _wait(process, address := f"http://{HOST}:{port}")
+        if not becomes_ready(address := f"http://{HOST}:{port}", process.is_alive):
+            raise Unreachable(f"the service at {address} does not start; `onelook serve` says why")
         yield address
     finally:
         process.terminate()
@@ -35,18 +27,6 @@ def serve(memory: Path, grid: int, warm: bool) -> Iterator[str]:
         if process.is_alive():
             process.kill()
             process.join()
-
-
-def _wait(process: multiprocessing.process.BaseProcess, address: str) -> None:
-    deadline = time.monotonic() + START_S
-    while time.monotonic() < deadline and process.is_alive():
-        try:
-            if httpx.get(f"{address}/readyz", timeout=2).is_success:
-                return
-        except httpx.TransportError:
-            pass
-        time.sleep(POLL_S)
-    raise Unreachable(f"the service at {address} does not start; `onelook serve` says why")
 
 
 def _serve(memory: Path, grid: int, warm: bool, port: int) -> None:

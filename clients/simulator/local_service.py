@@ -8,7 +8,7 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType, MappingProxyType
@@ -66,17 +66,22 @@ def free_port() -> int:
         return int(probe.getsockname()[1])
 
 
-def _wait(process: subprocess.Popen[bytes], address: str, log: Path) -> None:
+def becomes_ready(address: str, alive: Callable[[], bool]) -> bool:
+    """Waits until a service that was started answers that it is ready; False where its process ends or START_S pass before."""
     deadline = time.monotonic() + START_S
-    while time.monotonic() < deadline:
-        if process.poll() is not None:
-            break
+    while time.monotonic() < deadline and alive():
         try:
             if httpx.get(f"{address}/readyz", timeout=2).is_success:
-                return
+                return True
         except httpx.TransportError:
             pass
         time.sleep(POLL_S)
+    return False
+
+
+def _wait(process: subprocess.Popen[bytes], address: str, log: Path) -> None:
+    if becomes_ready(address, lambda: process.poll() is None):
+        return
     reason = "stopped" if process.poll() is not None else f"is not ready after {START_S:.0f} s"
     end = "\n".join(log.read_text().splitlines()[-LOG_LINES:])
     raise Unreachable(f"the service {reason}; its log {log} ends with\n{end}")

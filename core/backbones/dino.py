@@ -102,9 +102,10 @@ class DinoBackbone:
                 hook.remove()
         found = {name: value.float().cpu().numpy() for name, value in result.items()}
         where = shown.reshape(-1, *into.attention.shape[1:])
-        patches, attended = np.zeros((*where.shape, self.dim), np.float32), np.zeros(where.shape, np.float32)
-        patches[where], attended[where] = found["patches"].reshape(-1, self.dim), found["attention"].ravel()
-        into.patches[rows], into.cls[rows], into.attention[rows] = patches, found["cls"], attended
+        image, row, column = np.nonzero(where)
+        into.patches[rows[image], row, column] = found["patches"].reshape(-1, self.dim)
+        into.attention[rows[image], row, column] = found["attention"].ravel()
+        into.cls[rows] = found["cls"]
         if into.saliency is not None:
             into.saliency[rows] = found["saliency"] * where.repeat(self.patch_size, axis=1).repeat(self.patch_size, axis=2)
 
@@ -185,7 +186,7 @@ def _shown_patches(images: NDArray[np.uint8], patch_size: int) -> NDArray[np.boo
 
 def _keep(caught: dict[str, Tensor], name: str) -> Callable[[nn.Module, Any, Any], None]:
     def hook(module: nn.Module, inputs: Any, output: Any) -> None:
-        caught[name] = output[0] if isinstance(output, tuple) else output
+        caught[name] = output
 
     return hook
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -18,17 +19,27 @@ from clients.errors import ServiceProblem, Unreachable
 from core.errors import InvalidInput
 from service.settings import Settings
 
+PASS_S = 0.1
+"""Of the backbone; encoding a burst takes two."""
+
 
 @pytest.fixture
-def url(tmp_path: Path, backbone: Any, serving: Any) -> Iterator[str]:
-    """A service with one worker and one place in its queue."""
+def url(tmp_path: Path, backbone: Any, serving: Any, monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
+    """A service with one worker and one place in its queue, whose backbone takes long enough for the queue to fill."""
+    quick = backbone.extract
+
+    def extract(images: Any) -> Any:
+        time.sleep(PASS_S)
+        return quick(images)
+
+    monkeypatch.setattr(backbone, "extract", extract)
     small = Settings(data_dir=tmp_path / "memory", variant="ucd", score="pooled_best_view", workers=1, queue=1)
     with serving(small, backbone) as address:
         yield address
 
 
 def test_more_robots_than_places_are_refused_and_nobody_fails(url: str, recorded: Path, tmp_path: Path) -> None:
-    rows = load.run(tmp_path / "load.json", tmp_path / "load.png", [1, 6], seconds=1.5, views=3, data=recorded, url=url)
+    rows = load.run(tmp_path / "load.json", tmp_path / "load.png", [1, 6], seconds=2.5, views=3, data=recorded, url=url)
     alone, crowded = rows
     assert (alone.robots, alone.refused, alone.failed) == (1, 0, 0)
     assert alone.answered > 0

@@ -12,7 +12,7 @@ LINE = np.array([[0, 0], [0, 1], [0, 5], [0, 9]], dtype=np.float32)
 
 
 def patches(*views: np.ndarray) -> PatchSet:
-    return PatchSet.pad(views, [LINE[: len(view)] for view in views])
+    return PatchSet.of(views, [LINE[: len(view)] for view in views])
 
 
 @pytest.mark.parametrize("method", ["nearest", "mutual", "cyclical"])

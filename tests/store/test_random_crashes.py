@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, Phase, settings
+from hypothesis import HealthCheck, Phase, seed, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, precondition, rule, run_state_machine_as_test
 
@@ -36,7 +36,9 @@ from store.sweep import FOLDERS
 from tests.faults import Crash, Disk, tapped
 
 LEAST_CRASHES = 200
-EXAMPLES, STEPS = 40, 30
+EXAMPLES, STEPS = 20, 30
+MOST_ROUNDS = 8
+"""Of so many examples: where crashes fall is left to chance, and short steps are seldom hit."""
 KEPT = 4
 """Observations, so that the oldest are dropped all the time."""
 CALLS = {
@@ -385,8 +387,10 @@ def test_two_hundred_crashes_lose_nothing_that_was_acknowledged(material: Materi
         suppress_health_check=list(HealthCheck),
         print_blob=False,
     )
-    run_state_machine_as_test(Here, settings=how)
+    steps = {"begin a scan", "add views", "learn", "observe", "merge", "split", "forget", "rename", "delete", "undo", "import", "open"}
+    for number in range(MOST_ROUNDS):
+        run_state_machine_as_test(seed(number)(Here), settings=how)
+        if sum(Here.crashed.values()) >= LEAST_CRASHES and steps <= Here.crashed.keys():
+            break
     assert sum(Here.crashed.values()) >= LEAST_CRASHES, Here.crashed
-    missed = {"begin a scan", "add views", "learn", "observe", "merge", "split", "forget", "rename", "delete", "undo", "import", "open"}
-    # Where in a step a crash falls is left to chance, and short steps are seldom hit; test_crash.py kills at each of their commits.
-    assert len(missed - Here.crashed.keys()) <= 2, f"no crash fell into {missed - Here.crashed.keys()}"
+    assert not steps - Here.crashed.keys(), f"no crash fell into {steps - Here.crashed.keys()}"
