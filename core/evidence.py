@@ -97,8 +97,8 @@ def match_views(target: Tensor, others: Sequence[Tensor]) -> FloatArray:
     found: list[float] = []
     for start in range(0, len(others), BATCH):
         batch = others[start : start + BATCH]
-        cosines = (target.flatten(0, 1) @ torch.cat(list(batch)).flatten(0, 1).T).unflatten(1, (-1, batch[0].shape[1]))
-        cosines = cosines.unflatten(0, target.shape[:2])
+        stacked = torch.cat(list(batch))
+        cosines = (target.flatten(0, 1) @ stacked.flatten(0, 1).T).view(*target.shape[:2], *stacked.shape[:2])
         views = (cosines.amax(dim=3).mean(dim=1) + cosines.amax(dim=1).mean(dim=2)) / 2
         for each in torch.split(views, [len(other) for other in batch], dim=1):
             found.append(float((each.amax(dim=0).mean() + each.amax(dim=1).mean()) / 2))
