@@ -114,7 +114,7 @@ def open_agent(settings: Settings, metrics: Metrics, backbone: Backbone | None, 
             metrics.count_event(event)
             log_event(event)
 
-        chosen = compute or local(BatchingBackbone(backbone or warm_backbone(settings), metrics.count_pass))
+        chosen = compute or local(BatchingBackbone(backbone or warm_backbone(settings), metrics.count_pass, settings.deadline_s))
         agent = Agent(chosen, opened, config, Events(tell))
         try:
             yield agent

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import logging
+import math
 import threading
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -23,6 +25,7 @@ LOOK_S = 0.1
 """How often who waits for a pass looks whether it is still wanted."""
 CPU_ALLOCATOR = "can't allocate memory"
 """What torch's error says there, which is of no class of its own."""
+HANGS = "if this does not end, it hangs, and the service has to start anew: `onelook serve` ends by itself for that, but not with --cluster"
 log = logging.getLogger("onelook")
 
 
@@ -47,8 +50,8 @@ class BatchingBackbone:
     that one cannot fail the others, and one that memory does not suffice for in halves.
     """
 
-    def __init__(self, backbone: Backbone, on_pass: Callable[[int], None] = lambda images: None) -> None:
-        """`on_pass` is told the number of images of each pass."""
+    def __init__(self, backbone: Backbone, on_pass: Callable[[int], None] = lambda images: None, deadline_s: float = math.inf) -> None:
+        """`on_pass` is told the number of images of each pass; one that takes longer than `deadline_s` is not sound."""
         self.name = backbone.name
         self.patch_size = backbone.patch_size
         self.dim = backbone.dim
@@ -57,11 +60,14 @@ class BatchingBackbone:
         self.fingerprint = backbone.fingerprint
         self._backbone = backbone
         self._on_pass = on_pass
+        self._deadline_s = deadline_s
         self._waiting: list[_Ticket] = []
         self._waiting_lock = threading.Lock()
         self._pass_lock = threading.Lock()
         self._failed = False
         """The last pass."""
+        self._began: float | None = None
+        """The pass that runs."""
 
     def extract(self, images: Images) -> Features:
         """See `Backbone.extract`. Raises Unavailable where it fails, and CalledOff where nobody waits for it any more."""
@@ -80,7 +86,12 @@ class BatchingBackbone:
         return ticket.features
 
     def require_sound(self) -> None:
-        """Raises Unavailable where the last pass failed and another one, of one image, still does; one that runs is not waited for."""
+        """Raises Unavailable where the last pass failed and another one, of one image, still does, and where one takes longer than it may.
+
+        One that runs is not waited for.
+        """
+        if (pass_s := self.pass_s()) > self._deadline_s:
+            raise Unavailable(f"a pass of the backbone {self.name} has run for {pass_s:.0f} s, longer than a request may take; {HANGS}")
         if not self._failed or not self._pass_lock.acquire(blocking=False):
             return
         side = EncoderConfig().first_grid * self.patch_size
@@ -90,6 +101,11 @@ class BatchingBackbone:
             raise self._unavailable(error) from error
         finally:
             self._pass_lock.release()
+
+    def pass_s(self) -> float:
+        """For how long the pass that runs has done so; 0 where none does."""
+        began = self._began
+        return 0.0 if began is None else time.monotonic() - began
 
     def _take_pass(self, ticket: _Ticket) -> None:
         while not self._pass_lock.acquire(timeout=LOOK_S):
@@ -128,6 +144,7 @@ class BatchingBackbone:
             start += len(ticket.images)
 
     def _passed(self, images: Images) -> Features:
+        self._began = time.monotonic()
         try:
             features = self._backbone.extract(images)
         except Exception as error:
@@ -137,6 +154,8 @@ class BatchingBackbone:
                 raise
             half = len(images) // 2
             return _joined(self._passed(images[:half]), self._passed(images[half:]))
+        finally:
+            self._began = None
         self._failed = False
         self._on_pass(len(images))
         return features

@@ -30,6 +30,11 @@ class Turn:
             self._called_off = not self._writing
             return self._called_off
 
+    @property
+    def writing(self) -> bool:
+        """Whether it cannot be called off any more."""
+        return self._writing
+
     def require(self) -> None:
         """Raises CalledOff."""
         with self._lock:

@@ -65,10 +65,12 @@ class WorkQueue:
         self._piece_s = FIRST_GUESS_S
         self._stopping = False
         self._lock = threading.Lock()
+        self._pending = 0
+        self._running: set[Turn] = set()
         self._given_up: dict[Turn, float] = {}
         """Pieces that still run though nobody waits for them, and since when."""
-        self._pending = 0
-        self._running = 0
+        self._late_writes: dict[Turn, float] = {}
+        """Pieces that would have been given up if they did not write already, and since when."""
 
     @property
     def pending(self) -> int:
@@ -78,12 +80,18 @@ class WorkQueue:
     @property
     def running(self) -> int:
         """Pieces that run."""
-        return self._running
+        return len(self._running)
 
     @property
     def waiting(self) -> int:
         """Pieces that wait."""
-        return self._pending - self._running
+        return self._pending - len(self._running)
+
+    @property
+    def writing(self) -> bool:
+        """Whether something writes that is not late, or may take as long as it takes."""
+        with self._lock:
+            return any(turn.writing for turn in self._running - self._late_writes.keys())
 
     async def run(self, work: Callable[[], T], *, gone: Gone | None = None, endless: bool = False) -> T:
         """The result of `work()`; what is `endless` is waited for however long it takes, also for nobody.
@@ -94,6 +102,8 @@ class WorkQueue:
         """
         self._require_place()
         turn = Turn()
+        if endless:
+            turn.begin_writing()
         with self._lock:
             self._pending += 1
         future: Future[T] = self._threads.submit(self._piece, turn, work, copy_context(), time.perf_counter())
@@ -131,13 +141,12 @@ class WorkQueue:
 
     def _give_up(self, turn: Turn, future: Future[Any]) -> bool:
         """Whether it could be: not where it writes already."""
-        if not turn.call_off():
-            return False
-        if not future.cancel():
+        dropped = turn.call_off()
+        if not (dropped and future.cancel()):
             with self._lock:
-                if not future.done():
-                    self._given_up[turn] = time.monotonic()
-        return True
+                if turn in self._running:
+                    (self._given_up if dropped else self._late_writes)[turn] = time.monotonic()
+        return dropped
 
     def stop(self) -> None:
         """From now on nothing new is begun, neither of what comes nor of what waits."""
@@ -145,7 +154,7 @@ class WorkQueue:
 
     async def finished(self) -> None:
         """Returns once nothing runs any more."""
-        while self._running > len(self._given_up):  # those never write
+        while len(self._running) > len(self._given_up):  # those never write
             await asyncio.sleep(POLL_S)
         self._threads.shutdown(wait=False, cancel_futures=True)
 
@@ -153,6 +162,11 @@ class WorkQueue:
         """For how long all workers have been held by work that nobody waits for any more; None where one is not."""
         with self._lock:
             return time.monotonic() - max(self._given_up.values()) if len(self._given_up) >= self._workers else None
+
+    def late_write_s(self) -> float:
+        """For how long the longest write has gone on after its deadline; 0 where none does. What is `endless` is never late."""
+        with self._lock:
+            return time.monotonic() - min(self._late_writes.values()) if self._late_writes else 0.0
 
     def _require_place(self) -> None:
         self._require_open()
@@ -172,12 +186,12 @@ class WorkQueue:
     def _piece(self, turn: Turn, work: Callable[[], T], context: Context, arrived: float) -> T:
         """In a thread of the pool."""
         self._require_open()
-        turn.require()
         start = time.perf_counter()
-        self._on_start(start - arrived)
         with self._lock:
-            self._running += 1
+            self._running.add(turn)
         try:
+            turn.require()
+            self._on_start(start - arrived)
             return context.run(_with_turn, turn, work)
         except Exception:
             raise
@@ -185,8 +199,9 @@ class WorkQueue:
             raise Unavailable(f"the worker was ended ({error!r}); the next request gets another one") from error
         finally:
             with self._lock:
-                self._running -= 1
+                self._running.discard(turn)
                 self._given_up.pop(turn, None)
+                self._late_writes.pop(turn, None)
             self._piece_s = MEMORY * self._piece_s + (1 - MEMORY) * (time.perf_counter() - start)
 
     def _leave(self) -> None:

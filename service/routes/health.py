@@ -8,6 +8,7 @@ from fastapi import APIRouter, Request
 
 from core.errors import OneLookError, Unavailable
 from service.auth import GuardedRoute
+from service.batching import HANGS
 from service.deps import AgentDep
 from service.schemas.info import Health, Info
 from service.schemas.problem import problems
@@ -32,10 +33,7 @@ def readyz(request: Request, agent: AgentDep) -> Health:
             wrong.append(str(error))
     stuck_s = request.app.state.work.stuck_s()
     if stuck_s is not None:
-        wrong.append(
-            f"all workers have been held for {stuck_s:.0f} s by requests that were given up (ONELOOK_DEADLINE_S): if this does not end, "
-            "the backbone or the disk hangs; start the service again"
-        )
+        wrong.append(f"all workers have been held for {stuck_s:.0f} s by requests that were given up (ONELOOK_DEADLINE_S); {HANGS}")
     if wrong:
         raise Unavailable("; and ".join(wrong))
     return Health()

@@ -134,6 +134,13 @@ def test_a_container_gets_longer_to_stop_than_answers_get_to_go_out() -> None:
     assert int(unit()["Service"]["TimeoutStopSec"]) > GRACE_S
 
 
+def test_a_service_that_ended_itself_is_started_anew() -> None:
+    service = unit()["Service"]
+    assert service["Restart"] == "on-failure"  # which any exit code but 0 is
+    assert not {"RestartPreventExitStatus", "SuccessExitStatus"} & set(service)
+    assert COMPOSE["services"]["onelook"]["restart"] == "unless-stopped"
+
+
 def unit() -> Any:
     """The systemd unit; of a name that comes twice the last value."""
     parser = configparser.ConfigParser(strict=False, interpolation=None)

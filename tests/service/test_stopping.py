@@ -47,10 +47,11 @@ class Process:
 
 
 @contextmanager
-def served(memory: Path, pass_s: float = PASS_S, grace_s: int = 30) -> Iterator[Process]:
-    """A service on that folder."""
+def served(memory: Path, pass_s: float = PASS_S, grace_s: int = 30, **settings: object) -> Iterator[Process]:
+    """A service on that folder, with one worker unless the settings say otherwise."""
     command = [sys.executable, str(Path(__file__).with_name("slow_service.py")), str(memory), str(pass_s), str(grace_s)]
-    environment = os.environ | {"PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
+    given = {f"ONELOOK_{name.upper()}": str(value) for name, value in ({"workers": 1} | settings).items()}
+    environment = os.environ | given | {"PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment) as child:
         try:
             address = child.stdout.readline().strip()
