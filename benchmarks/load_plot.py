@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from benchmarks.load import LoadRow
 
 SIZE = (12, 3.8)
+HEADROOM = 1.35
+"""Above the curves, for what they mean."""
 DPI = 110
 
 
@@ -26,20 +28,20 @@ def plot_load(file: Path, rows: Sequence[LoadRow], title: str) -> None:
     rate.plot(robots, [row.per_s for row in rows], "o-", label="answered")
     rate.plot(robots, [row.refused / seconds for row, seconds in zip(rows, took)], "o--", label="refused (503, told when to come back)")
     rate.plot(robots, [row.failed / seconds for row, seconds in zip(rows, took)], "x:", color="tab:red", label="failed")
-    rate.set(ylabel="observations a second", ylim=(0, None))
+    rate.set(ylabel="observations a second")
     for name in ("p50_s", "p95_s", "p99_s"):
         times.plot(robots, [getattr(row, name) for row in rows], "o-", label=name.removesuffix("_s"))
-    times.set(ylabel="seconds to an answer", ylim=(0, None))
+    times.set(ylabel="seconds to an answer")
     inside.plot(robots, [row.waiting_mean for row in rows], "o-", label="waiting, mean")
     inside.plot(robots, [row.waiting_max for row in rows], "o--", label="waiting, most")
-    inside.set(ylabel="requests", ylim=(0, None))
+    inside.set(ylabel="requests")
     memory = inside.twinx()
     memory.plot(robots, [row.resident_mb for row in rows], "s-", color="tab:green", label="resident memory")
     memory.set(ylabel="MB", ylim=(0, 1.25 * max(row.resident_mb for row in rows)))
     for panel in (rate, times, inside):
         panel.set_xscale("log", base=2)
         panel.set_xticks(robots, [str(each) for each in robots])
-        panel.set(xlabel="robots at once")
+        panel.set(xlabel="robots at once", ylim=(0, HEADROOM * panel.get_ylim()[1]))
         panel.legend(fontsize=8, loc="upper left")
     memory.legend(fontsize=8, loc="lower right")
     _save(figure, file, title)
