@@ -11,6 +11,8 @@ from core.encode import EncodedBurst
 from core.quality import ViewFault, faults, region_of_encoded
 from core.views import Burst
 
+MOST_CONTRADICTED = 0.5
+"""Share of what was found in a view that the other views may contradict before it is told."""
 ONE_SIDE_DEG = 20.0
 """Views that differ by less, by angle about the object, show one side of it."""
 
@@ -39,12 +41,21 @@ class Grounds:
         return None
 
 
-def grounds(burst: Burst, encoded: EncodedBurst) -> Grounds:
-    """Of a burst and its encoding."""
-    shown = [view for view in encoded.views if len(view.cells)]
-    alone = (faults(view, region_of_encoded(seen)) for view, seen in zip(burst.views, encoded.views))
-    found = tuple(own + beside for own, beside in zip(alone, incoherent(burst, encoded)))
-    return Grounds(len(burst), len(shown), sum(bool(view.trusted.any()) for view in shown), _spread_deg(encoded), found)
+def grounds(burst: Burst, found: EncodedBurst, agreed: EncodedBurst) -> Grounds:
+    """Of a burst, what was found in it, and what of that its views agree about (`core.agreement`)."""
+    shown = [view for view in agreed.views if len(view.cells)]
+    alone = (faults(view, region_of_encoded(seen)) for view, seen in zip(burst.views, found.views))
+    told = tuple(own + beside for own, beside in zip(alone, incoherent(burst, found)))
+    told = tuple(each or _contradicted(len(seen.cells), len(left.cells)) for each, seen, left in zip(told, found.views, agreed.views))
+    return Grounds(len(burst), len(shown), sum(bool(view.trusted.any()) for view in shown), _spread_deg(agreed), told)
+
+
+def _contradicted(found: int, left: int) -> tuple[ViewFault, ...]:
+    if left >= MOST_CONTRADICTED * found:
+        return ()
+    return (
+        ViewFault("contradicted", f"the other views do not see {1 - left / found:.0%} of what stands out in it: something is before it"),
+    )
 
 
 def _spread_deg(encoded: EncodedBurst) -> float | None:

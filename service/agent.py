@@ -12,7 +12,7 @@ from core.clock import StageClock
 from core.coherence import require_one_unit
 from core.encode import EncodedBurst
 from core.errors import Conflict, InvalidInput, NoPose, NotFound, Unavailable
-from core.grounds import grounds
+from core.grounds import Grounds, grounds
 from core.matches import PoseEstimate
 from core.novelty import DEFAULT_SCORE, Decision, DecisionConfig
 from core.packing import burst_from_arrays
@@ -109,19 +109,28 @@ class Agent:
         if options.category_id is not None:
             self.memory.categories.get(options.category_id)
         clock = StageClock()
-        encoded = agreeing(self.encoder.encode(burst))
+        found = self.encoder.encode(burst)
+        encoded = agreeing(found)
         require_one_unit(encoded)
+        rests_on = grounds(burst, found, encoded)
         clock.lap("encode")
         for _ in range(DECISIONS - 1):
             try:
-                return self._answer(burst, encoded, options, config, clock, frame)
+                return self._answer(burst, encoded, rests_on, options, config, clock, frame)
             except (NotFound, Conflict):
                 if options.category_id is not None:
                     raise
-        return self._answer(burst, encoded, options, config, clock, frame)
+        return self._answer(burst, encoded, rests_on, options, config, clock, frame)
 
     def _answer(
-        self, burst: Burst, encoded: EncodedBurst, options: ObserveOptions, config: PoseConfig, clock: StageClock, frame: str | None
+        self,
+        burst: Burst,
+        encoded: EncodedBurst,
+        rests_on: Grounds,
+        options: ObserveOptions,
+        config: PoseConfig,
+        clock: StageClock,
+        frame: str | None,
     ) -> Observation:
         """Raises NotFound or Conflict where the category that was decided for is deleted meanwhile."""
         judge = self._judge_of(encoded, options.seed)
@@ -141,7 +150,7 @@ class Agent:
         estimate, record, pose_error = pose
         timings = _timings(clock, encoded, estimate)
         viewpoints = judged.viewpoints if judged else None
-        answer = Answer(outcome, category_id, frame, decision, record, pose_error, scan_error, timings, grounds(burst, encoded), viewpoints)
+        answer = Answer(outcome, category_id, frame, decision, record, pose_error, scan_error, timings, rests_on, viewpoints)
         joins = _joins(category_id, encoded, decision) if options.learn else None
         features = features_as_arrays(encoded, estimate)
         observation = self.memory.observations.create(answer, burst, features, request, joins=joins)

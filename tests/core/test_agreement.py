@@ -28,13 +28,13 @@ def with_table(encoded: EncodedBurst, index: int) -> EncodedBurst:
     return replace(encoded, views=tuple(views))
 
 
-def test_a_view_of_the_table_is_emptied_and_no_other(painted: PaintedObject) -> None:
+def test_of_a_view_of_the_table_what_lies_within_the_object_is_left_at_most(painted: PaintedObject) -> None:
     encoded = with_table(painted.encode(8, Sim3.identity()), 2)
     kept = agreeing(encoded)
-    assert [len(view.cells) > 0 for view in kept.views] == [index != 2 for index in range(8)]
-    assert len(kept.pooled) == len(kept.cls) == 7
+    assert len(kept.views[2].cells) < 0.2 * len(encoded.views[2].cells)
+    assert all(left is before for index, (left, before) in enumerate(zip(kept.views, encoded.views)) if index != 2)
     np.testing.assert_allclose(
-        build_reference(kept).box.extent_m, build_reference(painted.encode(8, Sim3.identity())).box.extent_m, rtol=0.05
+        build_reference(kept).box.extent_m, build_reference(painted.encode(8, Sim3.identity())).box.extent_m, rtol=0.1
     )
 
 
@@ -72,3 +72,42 @@ def test_a_scan_is_asked_for_about_the_object_though_some_patches_are_of_the_wal
     strays[: len(strays) // 3] += (0.0, 0.0, 4.0)
     strayed = replace(encoded, views=(replace(first, points_m=strays), *encoded.views[1:]))
     assert request_scan(strayed).radius_m == pytest.approx(request_scan(encoded).radius_m, rel=0.1)
+
+
+def before_the_object(view: EncodedView, share: float) -> EncodedView:
+    """The same view, a share of whose patches show a hand that is nearer to the camera."""
+    assert view.camera is not None
+    hidden = int(share * len(view.cells))
+    points = view.points_m.copy()
+    points[:hidden] += 0.3 * (view.camera.world_from_camera[:3, 3] - points[:hidden])
+    return replace(view, points_m=points)
+
+
+def test_what_is_before_the_object_in_one_view_goes(painted: PaintedObject) -> None:
+    encoded = painted.encode(8, Sim3.identity())
+    view = encoded.views[3]
+    found = replace(encoded, views=(*encoded.views[:3], before_the_object(view, 0.6), *encoded.views[4:]))
+    kept = agreeing(found).views
+    np.testing.assert_array_equal(kept[3].points_m, view.points_m[int(0.6 * len(view.cells)) :])
+    assert all(left is before for index, (left, before) in enumerate(zip(kept, encoded.views)) if index != 3)
+
+
+def test_patches_without_depth_are_not_judged(painted: PaintedObject) -> None:
+    encoded = painted.encode(8, Sim3.identity())
+    points = encoded.views[3].points_m.copy()
+    points[::2] = np.nan
+    views = (*encoded.views[:3], replace(encoded.views[3], points_m=points), *encoded.views[4:])
+    assert agreeing(replace(encoded, views=views)).views[3] is views[3]
+
+
+def test_cameras_that_are_all_wrong_take_nothing_out(painted: PaintedObject) -> None:
+    encoded = painted.encode(6, Sim3.identity())
+
+    def moved(view: EncodedView, index: int) -> EncodedView:
+        assert view.camera is not None
+        pose = view.camera.world_from_camera.copy()
+        pose[:3, 3] += 10.0 * index
+        return replace(view, camera=replace(view.camera, world_from_camera=pose), points_m=view.points_m + np.float32(10.0 * index))
+
+    astray = replace(encoded, views=tuple(moved(view, index) for index, view in enumerate(encoded.views)))
+    assert all(kept is view for kept, view in zip(agreeing(astray).views, astray.views))
