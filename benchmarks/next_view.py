@@ -174,7 +174,7 @@ def meet(job: Job) -> Case:
     drawn = np.random.default_rng([job.thing.seed, job.thing.number]).permutation(len(among))[:RANDOM]
 
     def after(pose: FloatArray) -> str:
-        again = memory.decide(_encode([*views, world.capture(pose)], job.backbone))
+        again = memory.decide(_encode([*views, world.capture(pose)], job.backbone), looks=1)
         return verdict(again, job.thing.category, held)
 
     return Case(job.thing.category, held, first, after(offered[0]), tuple(after(among[index]) for index in drawn))
@@ -199,12 +199,12 @@ class Memory:
 
     def __init__(self, job: Job) -> None:
         self._encoder = _encoder(job.backbone)
-        self._config = DecisionConfig(false_known_rate=job.rate)
+        self._rate = job.rate
         self._scans = dict(job.memory)
         self._members = [_member(category, file) for category, file in job.memory]
 
-    def decide(self, encoded: EncodedBurst) -> Decision:
-        """With poses."""
+    def decide(self, encoded: EncodedBurst, looks: int = 0) -> Decision:
+        """With poses. `looks`: views taken since the answer was uncertain."""
         whitening = self._encoder.backbone.whitening
         self._laid: dict[str, Candidate] = {}
 
@@ -217,7 +217,7 @@ class Memory:
             self._laid[category] = Candidate(reference, estimate.target_from_reference)
             return found
 
-        return decide(self._members, encoded, self._config, Context(whitening, verify=explain))
+        return decide(self._members, encoded, DecisionConfig(false_known_rate=self._rate, looks=looks), Context(whitening, verify=explain))
 
     def viewpoints(self, encoded: EncodedBurst, decision: Decision) -> FloatArray:
         """Those offered with the decision just made, shape (n, 4, 4)."""

@@ -29,7 +29,8 @@ BEST = "best"
 VERIFIED = 3
 """Categories whose poses are tried, those with the most evidence first."""
 UNCERTAIN_FACTOR = 10.0
-"""An object of no known category is answered `known` at the rate asked for, and `known` or `uncertain` at ten times that."""
+"""An object of no known category is answered `known` at the rate asked for, and `known` or `uncertain` at ten times that, until one looks
+again."""
 LEARN_FACTOR = 0.1
 """Evidence that an object of no known category reaches at a tenth of the rate lets a burst join: a false answer is over when it is given,
 a false member misleads every later one."""
@@ -57,11 +58,21 @@ class DecisionConfig:
     """Least similarity of a known object, and no third answer; None leaves it to the rate, or to a paper score's own default."""
     false_known_rate: float = 0.01
     """Of objects of no known category, how many may be called known; of score `best`."""
+    looks: int = 0
+    """Views taken for no other reason than that the object was uncertain: with each there is less room for doubt. What is still not known
+    from where it should differ most is the more likely novel, so the lower level rises; the upper one, which the rate is about, stays."""
 
     def __post_init__(self) -> None:
         require_score(self.score)
         if not 0 < self.false_known_rate <= 0.5:
             raise InvalidInput("false_known_rate", f"expected a share above 0 and at most 0.5, found {self.false_known_rate}")
+        if self.looks < 0:
+            raise InvalidInput("looks", f"expected 0 or more views, found {self.looks}")
+
+    @property
+    def uncertain_factor(self) -> float:
+        """Times the rate, at which an object of no known category is answered `known` or `uncertain`."""
+        return UNCERTAIN_FACTOR ** (1 / (1 + self.looks))
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,7 +225,7 @@ def _by_evidence(memory: Sequence[Member] | Enrolled, target: EncodedBurst, conf
     calibration = Calibration.fit(rivals, prior.of(verified))
     threshold, uncertain_above, learn_above = (
         calibration.threshold(min(factor * config.false_known_rate, 0.5)) if config.threshold is None else config.threshold
-        for factor in (1.0, UNCERTAIN_FACTOR, LEARN_FACTOR)
+        for factor in (1.0, config.uncertain_factor, LEARN_FACTOR)
     )
     best = similarities[0][1] if similarities else -np.inf
     outcome: Outcome = "known" if best > threshold else "uncertain" if best > uncertain_above else "novel"

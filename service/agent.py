@@ -61,6 +61,8 @@ class ObserveOptions:
     """Takes the object for one of this category and skips the decision."""
     threshold: float | None = None
     false_known_rate: float | None = None
+    looks: int = 0
+    """As in `DecisionConfig`."""
     variant: str | None = None
     pose: PoseOptions = field(default_factory=PoseOptions)
     """Of that variant."""
@@ -187,7 +189,7 @@ class Agent:
     def _judge(self, judge: Judge, options: ObserveOptions) -> Judgement:
         threshold = self.config.threshold if options.threshold is None else options.threshold
         rate = self.upkeep.false_known_rate if options.false_known_rate is None else options.false_known_rate
-        judged = judge.judge(DecisionConfig(self.config.score, threshold, rate))
+        judged = judge.judge(DecisionConfig(self.config.score, threshold, rate, options.looks))
         return judged if options.learn else replace(judged, decision=replace(judged.decision, rival=None))
 
     def _pose(self, category_id: str, burst: Burst, judge: Judge, config: PoseConfig, clock: StageClock) -> _PoseOrReason:

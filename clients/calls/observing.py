@@ -17,6 +17,7 @@ def observe(
     category_id: str | None = None,
     threshold: float | None = None,
     false_known_rate: float | None = None,
+    looks: int | None = None,
     views_used: int | None = None,
     up: Direction | None = None,
     variant: str | None = None,
@@ -39,6 +40,7 @@ def observe(
         category_id: takes the object for one of this category, and skips the decision.
         threshold: least similarity of a known object, in place of one from a rate.
         false_known_rate: of objects of no known category, the share that may be called known.
+        looks: views in the burst that were taken since the object was uncertain; with each there is less room for doubt.
         views_used: only the first so many views.
         up: away from the support, in the world frame, for the scan of a novel object; told from the cameras where None.
         variant, dof, dims, method, consensus_deg, inlier_ratio, estimator, alternatives, seed: of the pose pipeline (docs/method.md).
@@ -50,6 +52,7 @@ def observe(
         category_id=category_id,
         threshold=threshold,
         false_known_rate=false_known_rate,
+        looks=looks,
         views_used=views_used,
         up=None if up is None else list(up),
         variant=variant,

@@ -38,6 +38,12 @@ class ObserveQuery(BaseModel):
     false_known_rate: float | None = Field(
         None, ge=1e-4, le=0.5, description="Of objects of no known category, the share that may be called known, for this request."
     )
+    looks: int = Field(
+        0,
+        ge=0,
+        le=100,
+        description="Views in the burst that were taken since the object was uncertain; with each there is less room for doubt.",
+    )
     views_used: int | None = Field(None, ge=1, description="Uses only this many of the burst's views, the first ones.")
     learn: bool = Field(
         True,
@@ -65,6 +71,7 @@ class ObserveQuery(BaseModel):
             self.category_id,
             self.threshold,
             self.false_known_rate,
+            self.looks,
             self.variant,
             pose,
             self.alternatives,

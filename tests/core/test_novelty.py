@@ -144,6 +144,19 @@ def test_between_the_levels_the_answer_is_uncertain_and_names_candidates(painted
     assert unsure.candidates[0] == clear.similarities[0][0] == "kind 2"
 
 
+def test_every_further_look_leaves_less_room_for_doubt(painted: PaintedObject) -> None:
+    asked = [decide(SIX_KINDS, seen(painted, 2, 9), DecisionConfig(looks=looks)) for looks in (0, 1, 2, 9)]
+    levels = [decision.uncertain_above for decision in asked]
+    assert levels == sorted(set(levels))
+    assert levels[-1] < asked[0].threshold
+    assert len({(decision.threshold, decision.learn_above, decision.similarity) for decision in asked}) == 1
+
+
+def test_looks_that_cannot_be_are_refused() -> None:
+    with pytest.raises(InvalidInput, match="looks: expected 0 or more views, found -1"):
+        DecisionConfig(looks=-1)
+
+
 @pytest.mark.parametrize(("kind", "probable"), [(2, True), (9, False)])
 def test_an_uncertain_object_counts_as_what_is_more_probable(kind: int, probable: bool, painted: PaintedObject) -> None:
     burst = seen(painted, kind, 9)
