@@ -20,6 +20,7 @@ def test_without_the_terminal_libraries(monkeypatch: pytest.MonkeyPatch) -> None
 
 
 def test_without_the_service(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delitem(sys.modules, "service.server", raising=False)  # which other tests may have loaded
     monkeypatch.setitem(sys.modules, "uvicorn", None)
     failed = CliRunner().invoke(app, ["serve"])
     assert failed.exit_code == 1
