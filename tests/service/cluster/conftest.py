@@ -17,7 +17,7 @@ import httpx
 import pytest
 
 ROOT = Path(__file__).parents[3]
-START_S = 180
+START_S = 600
 STOP_S = 60
 
 
