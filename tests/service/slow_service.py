@@ -13,7 +13,6 @@ import sqlite3
 import sys
 import time
 from functools import partial
-from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import Any
 from unittest import mock
@@ -22,8 +21,7 @@ from service import server
 from service.app import create_app
 from service.logs import config
 from service.settings import Settings
-
-HERE = Path(__file__)
+from tests.conftest import ColourBackbone
 
 
 def hang(sign: Path) -> None:
@@ -34,14 +32,8 @@ def hang(sign: Path) -> None:
 
 def slow_backbone(pass_s: float, sign: Path) -> Any:
     """The synthetic world's, made slow, and hanging while there is that file."""
-    spec = spec_from_file_location("world", HERE.parents[1] / "conftest.py")
-    assert spec is not None
-    assert spec.loader is not None
-    world = module_from_spec(spec)
-    sys.modules["world"] = world
-    spec.loader.exec_module(world)
 
-    class Slow(world.ColourBackbone):  # type: ignore[name-defined, misc]
+    class Slow(ColourBackbone):
         def extract(self, images: Any) -> Any:
             time.sleep(pass_s)
             hang(sign)
