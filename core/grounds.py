@@ -54,7 +54,10 @@ def _contradicted(found: int, left: int) -> tuple[ViewFault, ...]:
     if left >= MOST_CONTRADICTED * found:
         return ()
     return (
-        ViewFault("contradicted", f"the other views do not see {1 - left / found:.0%} of what stands out in it: something is before it"),
+        ViewFault(
+            "contradicted",
+            f"the other views do not see {1 - left / found:.0%} of what stands out in it: something is before or beside the object",
+        ),
     )
 
 
