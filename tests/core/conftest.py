@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -64,3 +66,12 @@ def moved() -> Sim3:
     """A similarity worth recovering: 1.6 times as large, turned by 50° about a skew axis, shifted."""
     axis = np.array([0.4, -0.3, 0.866])
     return Sim3(1.6, Rotation.from_rotvec(np.radians(50) * axis / np.linalg.norm(axis)).as_matrix(), np.array([0.7, -1.1, 0.4]))
+
+
+def before_the_object(view: EncodedView, share: float) -> EncodedView:
+    """The same view, a share of whose patches show a hand that is nearer to the camera."""
+    assert view.camera is not None
+    hidden = int(share * len(view.cells))
+    points = view.points_m.copy()
+    points[:hidden] += 0.3 * (view.camera.world_from_camera[:3, 3] - points[:hidden])
+    return replace(view, points_m=points)

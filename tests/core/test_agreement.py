@@ -13,7 +13,7 @@ from core.reference import build_reference
 from core.scan import request_scan
 from core.sim3 import Sim3
 
-from .conftest import PaintedObject
+from .conftest import PaintedObject, before_the_object
 
 
 def of_a_table(view: EncodedView) -> EncodedView:
@@ -72,15 +72,6 @@ def test_a_scan_is_asked_for_about_the_object_though_some_patches_are_of_the_wal
     strays[: len(strays) // 3] += (0.0, 0.0, 4.0)
     strayed = replace(encoded, views=(replace(first, points_m=strays), *encoded.views[1:]))
     assert request_scan(strayed).radius_m == pytest.approx(request_scan(encoded).radius_m, rel=0.1)
-
-
-def before_the_object(view: EncodedView, share: float) -> EncodedView:
-    """The same view, a share of whose patches show a hand that is nearer to the camera."""
-    assert view.camera is not None
-    hidden = int(share * len(view.cells))
-    points = view.points_m.copy()
-    points[:hidden] += 0.3 * (view.camera.world_from_camera[:3, 3] - points[:hidden])
-    return replace(view, points_m=points)
 
 
 def test_what_is_before_the_object_in_one_view_goes(painted: PaintedObject) -> None:

@@ -13,8 +13,7 @@ from core.grounds import Grounds, grounds
 from core.sim3 import Sim3
 from core.views import Burst, View
 
-from .conftest import IMAGE, PaintedObject
-from .test_agreement import before_the_object
+from .conftest import IMAGE, PaintedObject, before_the_object
 
 
 def photographs(count: int) -> Burst:
