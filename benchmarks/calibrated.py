@@ -10,14 +10,13 @@ Letters: E episodes, T rates, L bursts an episode presents, N bursts.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import astuple, dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.best_pairs import BestPairs, BestSource, FloatArray, IntArray
 from core.calibration import Calibration, Samples
-from core.novelty import LEARN_FACTOR, UNCERTAIN_FACTOR
 
 RATES = (0.005, 0.01, 0.02, 0.05)
 """False-known rates asked for."""
@@ -116,6 +115,5 @@ def _levels(rivals: Sequence[Sequence[float]], rates: Sequence[float], prior: Sa
     levels = []
     for values, rate in zip(rivals, rates):
         calibration = Calibration.fit(values, prior)
-        quantiles = [calibration.threshold(min(factor * rate, 0.5)) for factor in (1.0, UNCERTAIN_FACTOR, LEARN_FACTOR)]
-        levels.append([*quantiles, calibration.even])
+        levels.append([*astuple(calibration.levels(rate)), calibration.even])
     return np.array(levels).T

@@ -27,6 +27,14 @@ PRIOR_SAMPLES = 10.0
 """Own samples that weigh as much as all shipped ones."""
 LOWER = 0.1587
 """Quantile one standard deviation below the median of a normal distribution."""
+UNCERTAIN_FACTOR = 10.0
+"""An object of no known category is answered `known` at the rate asked for, and `known` or `uncertain` at ten times that, until one looks
+again."""
+LEARN_FACTOR = 0.1
+"""Evidence that an object of no known category reaches at a tenth of the rate lets a burst join: a false answer is over when it is given,
+a false member misleads every later one."""
+LARGEST_RATE = 0.5
+"""Above it a threshold would lie below the median of what is wrong."""
 
 
 @dataclass(frozen=True)
@@ -64,6 +72,17 @@ class Prior:
 
 
 @dataclass(frozen=True)
+class Levels:
+    """Evidence that a decision asks for."""
+
+    known_above: float
+    uncertain_above: float
+    """Between it and the one above an object is uncertain."""
+    learn_above: float
+    """Above it a known burst joins its category."""
+
+
+@dataclass(frozen=True)
 class Calibration:
     """The evidence for the best wrong category as a Student distribution, and for the right one as a normal one of the same spread."""
 
@@ -87,6 +106,11 @@ class Calibration:
     def threshold(self, rate: float) -> float:
         """What an object of no known category exceeds with this probability."""
         return self.location + self.spread * float(stdtrit(self.freedom, 1 - rate)) * float(np.sqrt(1 + 1 / (self.freedom + 1)))
+
+    def levels(self, rate: float, looks: int = 0) -> Levels:
+        """The thresholds of a rate; each look that was taken for no other reason than doubt leaves less room for doubt."""
+        uncertain_factor = UNCERTAIN_FACTOR ** (1 / (1 + looks))
+        return Levels(*(self.threshold(min(factor * rate, LARGEST_RATE)) for factor in (1.0, uncertain_factor, LEARN_FACTOR)))
 
     def probability(self, evidence: float) -> float:
         """That the most similar category is right, with even odds beforehand; grows with the evidence."""

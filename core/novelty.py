@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.backbones.whitening import Whitening
-from core.calibration import Calibration, Prior
+from core.calibration import LARGEST_RATE, Calibration, Levels, Prior
 from core.descriptors import unit
 from core.encode import EncodedBurst
 from core.enrolled import Enrolled
@@ -28,12 +28,6 @@ Verify = Callable[[str], float]
 BEST = "best"
 VERIFIED = 3
 """Categories whose poses are tried, those with the most evidence first."""
-UNCERTAIN_FACTOR = 10.0
-"""An object of no known category is answered `known` at the rate asked for, and `known` or `uncertain` at ten times that, until one looks
-again."""
-LEARN_FACTOR = 0.1
-"""Evidence that an object of no known category reaches at a tenth of the rate lets a burst join: a false answer is over when it is given,
-a false member misleads every later one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,15 +58,10 @@ class DecisionConfig:
 
     def __post_init__(self) -> None:
         require_score(self.score)
-        if not 0 < self.false_known_rate <= 0.5:
-            raise InvalidInput("false_known_rate", f"expected a share above 0 and at most 0.5, found {self.false_known_rate}")
+        if not 0 < self.false_known_rate <= LARGEST_RATE:
+            raise InvalidInput("false_known_rate", f"expected a share above 0 and at most {LARGEST_RATE}, found {self.false_known_rate}")
         if self.looks < 0:
             raise InvalidInput("looks", f"expected 0 or more views, found {self.looks}")
-
-    @property
-    def uncertain_factor(self) -> float:
-        """Times the rate, at which an object of no known category is answered `known` or `uncertain`."""
-        return UNCERTAIN_FACTOR ** (1 / (1 + self.looks))
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,21 +212,18 @@ def _by_evidence(memory: Sequence[Member] | Enrolled, target: EncodedBurst, conf
     similarities = weighed(evidence)
     rivals = [each.rival for each in context.past if each.rival is not None and each.verified == verified]
     calibration = Calibration.fit(rivals, prior.of(verified))
-    threshold, uncertain_above, learn_above = (
-        calibration.threshold(min(factor * config.false_known_rate, 0.5)) if config.threshold is None else config.threshold
-        for factor in (1.0, config.uncertain_factor, LEARN_FACTOR)
-    )
+    levels = calibration.levels(config.false_known_rate, config.looks) if config.threshold is None else Levels(*(config.threshold,) * 3)
     best = similarities[0][1] if similarities else -np.inf
-    outcome: Outcome = "known" if best > threshold else "uncertain" if best > uncertain_above else "novel"
+    outcome: Outcome = "known" if best > levels.known_above else "uncertain" if best > levels.uncertain_above else "novel"
     likely = outcome == "known" or (outcome == "uncertain" and best > calibration.even)
     wrong = weighed(comparison.ranked(without=similarities[0][0])) if likely and comparison else similarities
     return Decision(
         outcome,
         config.score,
-        threshold,
+        levels.known_above,
         similarities,
-        uncertain_above,
-        learn_above,
+        levels.uncertain_above,
+        levels.learn_above,
         calibration.probability(best) if similarities else None,
         verified,
         wrong[0][1] if wrong else None,

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from datetime import datetime, timezone
 from pathlib import Path
 
-from core.calibration import Calibration, Prior
+from core.calibration import Calibration, Levels, Prior
 from core.errors import Conflict
-from core.novelty import BEST, LEARN_FACTOR, UNCERTAIN_FACTOR, Decision
+from core.novelty import BEST, Decision
 from service.events import Events
 from service.judgement import CALIBRATED_BY
 from store.backup import Backup
@@ -40,9 +40,7 @@ class Distribution:
     """The evidence of latest decisions, and what is made of it."""
 
     calibration: Calibration
-    known_above: float
-    uncertain_above: float
-    learn_above: float
+    levels: Levels
     rivals: tuple[float, ...]
     """Of own decisions, the evidence of the best wrong category."""
     decisions: tuple[Decision, ...]
@@ -80,7 +78,8 @@ class Upkeep:
     def thresholds(self) -> Thresholds:
         """As they are now."""
         tokens, verified = self.distributions()
-        return Thresholds(self.false_known_rate, tokens.known_above, verified.known_above, len(tokens.rivals) + len(verified.rivals))
+        known_above = (each.levels.known_above for each in (tokens, verified))
+        return Thresholds(self.false_known_rate, *known_above, len(tokens.rivals) + len(verified.rivals))
 
     def distributions(self) -> tuple[Distribution, Distribution]:
         """What the thresholds of the score `best` rest on: from tokens alone, and with poses."""
@@ -91,10 +90,7 @@ class Upkeep:
         past = [each for each in decisions if each.verified is verified]
         rivals = tuple(each.rival for each in past if each.rival is not None)
         calibration = Calibration.fit(rivals, Prior.shipped().of(verified))
-        known, uncertain, learn = (
-            calibration.threshold(min(factor * self.false_known_rate, 0.5)) for factor in (1.0, UNCERTAIN_FACTOR, LEARN_FACTOR)
-        )
-        return Distribution(calibration, known, uncertain, learn, rivals, tuple(past))
+        return Distribution(calibration, calibration.levels(self.false_known_rate), rivals, tuple(past))
 
     def backup(self, parent: Path, *, actor: str | None = None) -> Backup:
         """Copies the memory, while it is used, to a new folder in `parent`, called by time and version. Raises Conflict and Unavailable."""

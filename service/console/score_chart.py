@@ -66,8 +66,8 @@ def score_chart(found: Distribution) -> ScoreChart:
     fit = found.calibration
     scores = [(each.similarity, each.outcome) for each in found.decisions if each.similarity is not None]
     values = [value for value, _ in scores]
-    low = min(fit.location - REACH * fit.spread, *values, found.uncertain_above)
-    high = max(fit.own_location + REACH * fit.spread, *values, found.known_above)
+    low = min(fit.location - REACH * fit.spread, *values, found.levels.uncertain_above)
+    high = max(fit.own_location + REACH * fit.spread, *values, found.levels.known_above)
     scale = (WIDTH - 2 * ROOM) / (high - low)
 
     def across(value: float) -> float:
@@ -85,8 +85,8 @@ def score_chart(found: Distribution) -> ScoreChart:
         _area(columns, student),
         _area(columns, normal),
         tuple(dots),
-        Mark(across(found.known_above), found.known_above),
-        Mark(across(found.uncertain_above), found.uncertain_above),
+        Mark(across(found.levels.known_above), found.levels.known_above),
+        Mark(across(found.levels.uncertain_above), found.levels.uncertain_above),
         tuple(Mark(across(value), value) for value in _round_numbers(low, high)),
         len(found.rivals),
     )

@@ -46,3 +46,16 @@ def test_what_ships_puts_other_instances_above_other_categories() -> None:
     for samples in (prior.tokens, prior.verified):
         assert np.median(samples.own) > np.quantile(samples.rivals, 0.75)
     assert prior.agreement_weight > 0
+
+
+def test_one_rate_makes_three_levels_and_a_look_narrows_the_room_for_doubt() -> None:
+    calibration = Calibration.fit([], PRIOR)
+    asked, looked = calibration.levels(0.02), calibration.levels(0.02, looks=1)
+    assert asked.known_above == calibration.threshold(0.02)
+    assert (asked.uncertain_above, asked.learn_above) == (calibration.threshold(0.2), calibration.threshold(0.002))
+    assert asked.uncertain_above < looked.uncertain_above < looked.known_above == asked.known_above
+
+
+def test_doubt_ends_at_the_median_of_what_is_wrong() -> None:
+    calibration = Calibration.fit([], PRIOR)
+    assert calibration.levels(0.3).uncertain_above == pytest.approx(calibration.location)

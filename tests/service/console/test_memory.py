@@ -107,7 +107,7 @@ def test_what_lies_right_of_the_threshold_is_known():
     decisions = tuple(
         Decision(outcome, "best", 0.4, (("a", value),), verified=True) for outcome, value in (("known", 0.9), ("novel", -0.2))
     )
-    chart = score_chart(Distribution(fit, fit.threshold(0.01), fit.threshold(0.1), fit.threshold(0.001), (0.2, 0.3), decisions))
+    chart = score_chart(Distribution(fit, fit.levels(0.01), (0.2, 0.3), decisions))
     known, novel = chart.dots
     assert novel.x < chart.uncertain.x < chart.known.x < known.x
     assert chart.own_rivals == 2
