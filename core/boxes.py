@@ -15,6 +15,7 @@ from core.affine9 import Affine9
 from core.errors import NoObject
 from core.foreground import fit_plane
 from core.sim3 import Sim3
+from core.views import Camera
 
 FloatArray = NDArray[np.floating]
 
@@ -40,6 +41,15 @@ class OrientedBox:
     def holds(self, points_m: FloatArray, times: float = 1.0) -> NDArray[np.bool_]:
         """Which world points, shape (N, 3), are within `times` its size, shape (N,)."""
         return np.asarray((np.abs(self.in_object(points_m)) <= times * self.extent_m / 2).all(axis=1))
+
+    def within_image(self, camera: Camera, size: tuple[int, int]) -> tuple[float, float, float, float] | None:
+        """(left, top, right, bottom) of its corners in an image of (height, width), pixels; None where one is behind the camera."""
+        pixels, depths = camera.project(self.corners())
+        if (depths <= 0).any():
+            return None
+        height, width = size
+        (left, top), (right, bottom) = (np.clip(each, 0, (width - 1, height - 1)) for each in (pixels.min(axis=0), pixels.max(axis=0)))
+        return float(left), float(top), float(right), float(bottom)
 
     def moved_by(self, target_from_reference: Sim3) -> OrientedBox:
         """The box on the target: its frame stays rigid, the scale goes into the extent."""

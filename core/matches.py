@@ -37,6 +37,14 @@ class Matches:
     def __len__(self) -> int:
         return len(self.similarity)
 
+    def best_pair(self, pairs: Sequence[tuple[int, int]]) -> tuple[int, int]:
+        """The (reference view, target view) pair with the most inliers, the first of equals; `pairs` is not empty."""
+
+        def inliers(pair: tuple[int, int]) -> int:
+            return int((self.inlier & (self.reference_view == pair[0]) & (self.target_view == pair[1])).sum())
+
+        return max(pairs, key=inliers)
+
 
 @dataclass(frozen=True, eq=False)
 class Alternative:

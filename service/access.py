@@ -104,6 +104,13 @@ ACCESS: Mapping[str, Role | None] = {
 """By the route's name, which is its operation id, after `console_` for a page; None asks nobody for a key."""
 
 
+def needed_role(name: str) -> Role | None:
+    """What the route of this name takes. Raises LookupError for one that the table does not have."""
+    if name not in ACCESS:
+        raise LookupError(f"nothing says which role the route {name!r} takes: add it to ACCESS in service/access.py")
+    return ACCESS[name]
+
+
 def allows(role: Role, needed: Role) -> bool:
     """Whether `role` may do what takes `needed`."""
     return ROLES.index(role) >= ROLES.index(needed)

@@ -1,30 +1,24 @@
-"""The agent: looks, decides, and says where the object is. No HTTP in it."""
+"""The agent: looks, decides, says where the object is, and keeps it. No HTTP in it."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-import numpy as np
-
-from core.agreement import agreeing
-from core.boxes import OrientedBox
 from core.clock import StageClock
-from core.coherence import require_one_unit
 from core.encode import EncodedBurst
 from core.errors import Conflict, InvalidInput, NoPose, NotFound, Unavailable
-from core.grounds import Grounds, grounds
+from core.look import Look, look
 from core.matches import PoseEstimate
 from core.novelty import DEFAULT_SCORE, Decision, DecisionConfig
 from core.packing import burst_from_arrays
 from core.pose import PoseConfig, PoseOptions
-from core.reference import Reference
 from core.scan import DEFAULT_VIEWPOINTS, ScanOptions, ScanRequest, request_scan
 from core.verification import VERIFYING
-from core.views import Burst, View
+from core.views import Burst
 from service.compute import Compute, Named
 from service.curation import Curation
 from service.events import Events
-from service.features import best_pair, features_as_arrays
+from service.features import features_as_arrays
 from service.goals import Rearranging
 from service.judgement import Judge, Judgement
 from service.scanning import Scanning
@@ -42,7 +36,7 @@ class AgentConfig:
     score: str = DEFAULT_SCORE
     threshold: float | None = None
     """Least similarity of a known object, and no third answer; None leaves it to the score, of `best` to the rate."""
-    variant: str = "ucd"
+    variant: str = VERIFYING.variant
     scan_views: int = DEFAULT_VIEWPOINTS
     false_known_rate: float = DecisionConfig.false_known_rate
     """Of objects of no known category, how many may be called known; of score `best`."""
@@ -111,31 +105,21 @@ class Agent:
         if options.category_id is not None:
             self.memory.categories.get(options.category_id)
         clock = StageClock()
-        found = self.encoder.encode(burst)
-        encoded = agreeing(found)
-        require_one_unit(encoded)
-        rests_on = grounds(burst, found, encoded)
+        seen = look(burst, self.encoder)
         clock.lap("encode")
         for _ in range(DECISIONS - 1):
             try:
-                return self._answer(burst, encoded, rests_on, options, config, clock, frame)
+                return self._decide_and_keep(seen, options, config, clock, frame)
             except (NotFound, Conflict):
                 if options.category_id is not None:
                     raise
-        return self._answer(burst, encoded, rests_on, options, config, clock, frame)
+        return self._decide_and_keep(seen, options, config, clock, frame)
 
-    def _answer(
-        self,
-        burst: Burst,
-        encoded: EncodedBurst,
-        rests_on: Grounds,
-        options: ObserveOptions,
-        config: PoseConfig,
-        clock: StageClock,
-        frame: str | None,
+    def _decide_and_keep(
+        self, seen: Look, options: ObserveOptions, config: PoseConfig, clock: StageClock, frame: str | None
     ) -> Observation:
         """Raises NotFound or Conflict where the category that was decided for is deleted meanwhile."""
-        judge = self._judge_of(encoded, options.seed)
+        judge = self._judge_of(seen.encoded, options.seed)
         judged = None if options.category_id is not None else self._judge(judge, options)
         decision = judged.decision if judged else None
         clock.lap("decide")
@@ -146,17 +130,26 @@ class Agent:
         if outcome == "known":
             category_id = decision.similarities[0][0] if decision else options.category_id
             assert category_id is not None
-            pose = self._pose(category_id, burst, judge, config, clock)
+            pose = self._pose(category_id, seen.burst, judge, config, clock)
         elif outcome == "novel":
-            request, scan_error = self._scan_or_reason(encoded, options.up)
+            request, scan_error = self._scan_or_reason(seen.encoded, options.up)
         estimate, record, pose_error = pose
-        timings = _timings(clock, encoded, estimate)
-        viewpoints = judged.viewpoints if judged else None
-        answer = Answer(outcome, category_id, frame, decision, record, pose_error, scan_error, timings, rests_on, viewpoints)
-        joins = _joins(category_id, encoded, decision) if options.learn else None
-        features = features_as_arrays(encoded, estimate)
-        observation = self.memory.observations.create(answer, burst, features, request, joins=joins)
-        self.events.publish("observation", id=observation.id, outcome=outcome, category_id=category_id, timings_ms=timings)
+        answer = Answer(
+            outcome=outcome,
+            category_id=category_id,
+            frame=frame,
+            decision=decision,
+            pose=record,
+            pose_error=pose_error,
+            scan_error=scan_error,
+            timings_ms=_timings(clock, seen.encoded, estimate),
+            grounds=seen.grounds,
+            viewpoints=judged.viewpoints if judged else None,
+        )
+        joins = _joins(category_id, seen.encoded, decision) if options.learn else None
+        features = features_as_arrays(seen.encoded, estimate)
+        observation = self.memory.observations.create(answer, seen.burst, features, request, joins=joins)
+        self.events.publish("observation", id=observation.id, outcome=outcome, category_id=category_id, timings_ms=answer.timings_ms)
         return observation
 
     def observe_known(self, burst: Burst, category_id: str, frame: str | None) -> Observation:
@@ -195,7 +188,7 @@ class Agent:
     def _pose(self, category_id: str, burst: Burst, judge: Judge, config: PoseConfig, clock: StageClock) -> _PoseOrReason:
         if category_id in judge.poses and config == VERIFYING:
             reference, estimate = judge.poses[category_id]
-            return estimate, _pose_record(estimate, reference, burst), None
+            return estimate, Pose.of(estimate, reference, burst), None
         require_wanted()
         try:
             reference = self.memory.categories.reference(category_id)
@@ -205,7 +198,7 @@ class Agent:
             return None, None, str(error)
         finally:
             clock.lap("pose")
-        return estimate, _pose_record(estimate, reference, burst), None
+        return estimate, Pose.of(estimate, reference, burst), None
 
     def _scan_or_reason(self, encoded: EncodedBurst, up: tuple[float, float, float] | None) -> tuple[ScanRequest | None, str | None]:
         try:
@@ -224,37 +217,6 @@ def _joins(category_id: str | None, encoded: EncodedBurst, decision: Decision | 
         return Joins(category_id, encoded, None, "named")
     similarity = decision.similarities[0][1]
     return Joins(category_id, encoded, similarity, "decision") if similarity > decision.learn_above else None
-
-
-def _pose_record(estimate: PoseEstimate, reference: Reference, burst: Burst) -> Pose:
-    box = estimate.box(reference.box)
-    return Pose(
-        estimate.target_from_reference,
-        box,
-        estimate.inliers,
-        len(estimate.matches),
-        best_pair(estimate.pairs, estimate.matches)[1],
-        estimate.residual_m,
-        estimate.score,
-        estimate.confidence,
-        estimate.alternatives,
-        tuple(_box_px(box, view) for view in burst.views),
-        estimate.target_from_object,
-        estimate.not_9d_because,
-        reference.symmetries,
-    )
-
-
-def _box_px(box: OrientedBox, view: View) -> tuple[float, float, float, float] | None:
-    """(left, top, right, bottom) of the box's corners in an image; None where a corner is behind the camera."""
-    if view.camera is None:
-        return None
-    pixels, depths = view.camera.project(box.corners())
-    if (depths <= 0).any():
-        return None
-    height, width = view.size
-    (left, top), (right, bottom) = (np.clip(each, 0, (width - 1, height - 1)) for each in (pixels.min(axis=0), pixels.max(axis=0)))
-    return float(left), float(top), float(right), float(bottom)
 
 
 def _timings(clock: StageClock, encoded: EncodedBurst, estimate: PoseEstimate | None) -> dict[str, float]:

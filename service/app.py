@@ -17,7 +17,7 @@ from core.backbones.base import Backbone
 from core.backbones.dino import load_backbone
 from core.encode import EncoderConfig
 from core.errors import OneLookError
-from service import errors, openapi
+from service import errors
 from service.agent import Agent, AgentConfig
 from service.auth import Guard
 from service.batching import BatchingBackbone
@@ -29,7 +29,7 @@ from service.events import Event, Events
 from service.limits import BodyLimits
 from service.logs import Logged, log_event
 from service.metrics import Measured, Metrics
-from service.routes import categories, goals, health, memory, observations, scans, track
+from service.routes.install import install as install_endpoints
 from service.settings import Settings
 from store.memory import Memory
 
@@ -83,12 +83,8 @@ def create_app(settings: Settings, *, backbone: Backbone | None = None, compute:
     app.add_middleware(Measured, metrics=metrics)
     app.add_middleware(Logged)
     errors.install(app)
-    routers = (observations.router, scans.router, categories.router, goals.router, memory.router, memory.live, track.router, health.router)
-    for router in routers:
-        app.include_router(router)
-    openapi.install(app, [route for router in routers for route in router.routes])
+    install_endpoints(app)
     install_console(app)
-    app.state.made = observations.MADE | scans.MADE | categories.MADE | goals.MADE | memory.MADE
     return app
 
 
@@ -140,7 +136,13 @@ def require_startable(settings: Settings) -> None:
 def _checked(settings: Settings) -> Iterator[tuple[Memory, AgentConfig]]:
     """What is wrong with the settings is told before a backbone is loaded, which takes long."""
     settings.require_consistent()
-    config = AgentConfig(settings.score, settings.threshold, settings.variant, settings.scan_views, settings.false_known_rate)
+    config = AgentConfig(
+        score=settings.score,
+        threshold=settings.threshold,
+        variant=settings.variant,
+        scan_views=settings.scan_views,
+        false_known_rate=settings.false_known_rate,
+    )
     config.validate()
     with Memory.open(settings.data_dir, settings.retention) as opened:
         settings.require_safe(len(opened.keys.all()))

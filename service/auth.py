@@ -17,13 +17,13 @@ from fastapi.routing import APIRoute
 from starlette.requests import HTTPConnection
 
 from core.errors import OneLookError
-from service.access import ACCESS, ADMIN, allows
+from service.access import ADMIN, allows, needed_role
 from service.logs import robot
 from service.rate import RateLimit
 from store.keys import Key, Keys, Role
 from store.sessions import Sessions
 
-Answer = Callable[[Request], Coroutine[Any, Any, Response]]
+Answering = Callable[[Request], Coroutine[Any, Any, Response]]
 COOKIE = "onelook_session"
 LONGEST_ACTOR = 200
 HOW = "send the header `Authorization: Bearer KEY` (ONELOOK_API_KEY for the client and the commands)"
@@ -117,10 +117,10 @@ class GuardedRoute(APIRoute):
     kind = ""
     """Before the route's name in that table."""
 
-    def get_route_handler(self) -> Answer:
+    def get_route_handler(self) -> Answering:
         """FastAPI's, with `around` about it, and the guard before both."""
         answer = self.around(super().get_route_handler())
-        needed = ACCESS[self.kind + self.name]
+        needed = needed_role(self.kind + self.name)
 
         async def guarded(request: Request) -> Response:
             await request.app.state.guard.admit(request, needed)
@@ -128,14 +128,14 @@ class GuardedRoute(APIRoute):
 
         return guarded
 
-    def around(self, answer: Answer) -> Answer:
+    def around(self, answer: Answering) -> Answering:
         """What else a kind of routes does; here nothing."""
         return answer
 
 
 def admit_socket(name: str) -> Callable[[WebSocket], Coroutine[Any, Any, None]]:
     """A dependency that does the same for the WebSocket route of this name, before the connection is accepted."""
-    needed = ACCESS[name]
+    needed = needed_role(name)
 
     async def admit(socket: WebSocket) -> None:
         await socket.app.state.guard.admit(socket, needed)

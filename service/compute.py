@@ -7,11 +7,11 @@ from typing import Protocol
 
 from core.backbones.whitening import Whitening
 from core.encode import EncodedBurst, Encoder
+from core.look import Encodes
 from core.matches import PoseEstimate
 from core.pose import PoseConfig, PoseEstimator
 from core.reference import Reference
 from core.verification import verify
-from core.views import Burst
 from service.batching import BatchingBackbone
 
 
@@ -29,14 +29,6 @@ class Identity(Protocol):
 
     def require_sound(self) -> None:
         """Raises Unavailable where it is known to fail."""
-        ...
-
-
-class Encodes(Protocol):
-    """Bursts in, tokens out."""
-
-    def encode(self, burst: Burst) -> EncodedBurst:
-        """See `core.encode.Encoder.encode`."""
         ...
 
 

@@ -7,14 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from core.agreement import agreeing
 from core.descriptors import unit
 from core.errors import Conflict, InvalidInput, Unavailable
+from core.look import Encodes, look
 from core.novelty import SCORES, Member
 from core.packing import burst_from_arrays
 from core.reference import MIN_VIEWS, build_reference
 from core.views import Burst, FloatArray
-from service.compute import Encodes
 from service.events import Events
 from store.memory import Memory
 from store.records import Category, Instance, Observation
@@ -106,7 +105,7 @@ class Curation:
         if len(chosen) == len(own):
             raise InvalidInput("instance_ids", "are all instances of the category; leave it at least one, or rename it")
         burst = self._reference_burst(chosen)
-        reference = build_reference(agreeing(self._encoder.encode(burst)))
+        reference = build_reference(look(burst, self._encoder).encoded)
         category = self._memory.categories.split(category_id, chosen, reference, burst, name=name, actor=actor)
         self._events.publish("category_split", id=category.id, name=name, split_from=category_id)
         return category

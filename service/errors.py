@@ -70,7 +70,7 @@ def _on_onelook_error(request: Request, error: Exception) -> JSONResponse:
 
 def problem_answer(error: core.OneLookError) -> JSONResponse:
     """The answer that tells of `error`."""
-    return _answer(problem_of(error), _headers(error))
+    return _json(problem_of(error), _headers(error))
 
 
 def _headers(error: core.OneLookError) -> dict[str, str]:
@@ -83,7 +83,7 @@ def _headers(error: core.OneLookError) -> dict[str, str]:
 
 def _on_validation_error(request: Request, error: Exception) -> JSONResponse:
     assert isinstance(error, RequestValidationError)
-    return _answer(validation_problem(error.errors()))
+    return _json(validation_problem(error.errors()))
 
 
 def validation_problem(found: Sequence[Any]) -> Problem:
@@ -116,7 +116,7 @@ def field_path(location: Sequence[int | str]) -> str:
 def _on_http_exception(request: Request, error: Exception) -> JSONResponse:
     assert isinstance(error, HTTPException)
     if error.status_code == 400:  # what FastAPI says of a body that is no text
-        return _answer(
+        return _json(
             problem_of(
                 core.InvalidInput(
                     "body", "is no JSON that can be read: it is not UTF-8 text, too deeply nested, or has numbers that are too long"
@@ -129,7 +129,7 @@ def _on_http_exception(request: Request, error: Exception) -> JSONResponse:
         detail = f"nothing is at {request.url.path}; /docs lists what there is"
     elif error.status_code == 405 and detail == title:
         detail = f"{request.url.path} does not answer {request.method}; /docs lists what it answers"
-    return _answer(Problem(type="about:blank", title=title, status=error.status_code, detail=detail), error.headers)
+    return _json(Problem(type="about:blank", title=title, status=error.status_code, detail=detail), error.headers)
 
 
 def _on_out_of_memory(request: Request, error: Exception) -> JSONResponse:
@@ -152,7 +152,7 @@ def _on_os_error(request: Request, error: Exception) -> JSONResponse:
 
 def _on_unexpected(request: Request, error: Exception) -> JSONResponse:
     # Answered outside the middleware that names the others.
-    return _answer(_unexpected(), {HEADER: request_id.get() or ""})
+    return _json(_unexpected(), {HEADER: request_id.get() or ""})
 
 
 def _unexpected() -> Problem:
@@ -160,5 +160,5 @@ def _unexpected() -> Problem:
     return Problem(type="urn:onelook:problem:unexpected", title="Internal Server Error", status=500, detail=detail)
 
 
-def _answer(problem: Problem, headers: Any = None) -> JSONResponse:
+def _json(problem: Problem, headers: Any = None) -> JSONResponse:
     return JSONResponse(problem.model_dump(exclude_none=True), problem.status, headers=headers, media_type=MEDIA_TYPE)

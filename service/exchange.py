@@ -9,7 +9,7 @@ from fastapi import Request, Response
 
 from core.errors import InvalidInput
 from service.agent import Agent
-from service.auth import Answer, GuardedRoute
+from service.auth import Answering, GuardedRoute
 from store.requests import Earlier, Reply
 
 KEY = "Idempotency-Key"
@@ -25,7 +25,7 @@ class MemoryRoute(GuardedRoute):
     an Idempotency-Key is carried out once: its repetitions get the first answer again.
     """
 
-    def around(self, answer: Answer) -> Answer:
+    def around(self, answer: Answering) -> Answering:
         """That."""
         methods = self.methods or set()
 
@@ -39,7 +39,7 @@ class MemoryRoute(GuardedRoute):
         return exchange
 
 
-async def _conditional(request: Request, answer: Answer) -> Response:
+async def _conditional(request: Request, answer: Answering) -> Response:
     memory = _agent(request).memory
     version = await run_sync(lambda: memory.version)  # before the answer is made: it may be newer than its tag, never older
     tag = f'W/"{version}"'
@@ -50,7 +50,7 @@ async def _conditional(request: Request, answer: Answer) -> Response:
     return response
 
 
-async def _once(request: Request, answer: Answer, route: str) -> Response:
+async def _once(request: Request, answer: Answering, route: str) -> Response:
     key = request.headers.get(KEY)
     if key is None:
         return await answer(request)
@@ -59,8 +59,9 @@ async def _once(request: Request, answer: Answer, route: str) -> Response:
     digest = _digest(request, await request.body())
     # Entered on the event loop: the key travels to the thread that changes the memory in the context of this task.
     with _agent(request).memory.requests.once(key, route, digest) as once:
-        if once.earlier is not None:
+        if once.earlier is not None and (once.earlier.reply is not None or route in request.app.state.made):
             return await run_sync(_again, request, once.earlier, route)
+        # Also where all that is left of the first time is a step on the way, as the observation that a plan begins with.
         response = await answer(request)
         if response.status_code < 300:
             once.reply = Reply(response.status_code, response.headers.get("content-type", ""), bytes(response.body))

@@ -5,7 +5,7 @@ Letters: V views, K correspondences, M reference views.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -30,15 +30,6 @@ class PoseDetails:
     """Of reference view and burst view, shape (M, V)."""
     pairs: tuple[tuple[int, int], ...]
     """(reference view, burst view) pairs whose correspondences were used."""
-
-
-def best_pair(pairs: Sequence[tuple[int, int]], matches: Matches) -> tuple[int, int]:
-    """The (reference view, burst view) pair with the most inliers, the first of equals; `pairs` is not empty."""
-
-    def inliers(pair: tuple[int, int]) -> int:
-        return int((matches.inlier & (matches.reference_view == pair[0]) & (matches.target_view == pair[1])).sum())
-
-    return max(pairs, key=inliers)
 
 
 def features_as_arrays(encoded: EncodedBurst, estimate: PoseEstimate | None) -> dict[str, Array]:

@@ -14,7 +14,7 @@ from core.errors import NotFound
 from core.views import View
 from service import pictures
 from service.agent import Agent
-from service.features import PoseDetails, best_pair, pose_details_from_arrays
+from service.features import PoseDetails, pose_details_from_arrays
 from service.pictures import ComponentColours, Picture
 
 
@@ -142,4 +142,4 @@ def _pair(details: PoseDetails, index: int | None) -> tuple[int, int]:
     if not pairs:
         used = ", ".join(str(view) for view in sorted({target for _, target in details.pairs}))
         raise NotFound(f"the pose does not rest on view {index}; it rests on the views {used}")
-    return best_pair(pairs, details.matches)
+    return details.matches.best_pair(pairs)

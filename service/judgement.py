@@ -45,8 +45,8 @@ class Judge:
 
     def judge(self, config: DecisionConfig) -> Judgement:
         """Decides by the memory as it is. Poses are tried where the score is `best` and the burst has depth and cameras."""
-        categories = self.memory.categories
-        members = categories.enrolled(self.whitening) if config.score == BEST else categories.members()
+        instances = self.memory.instances
+        members = instances.enrolled(self.whitening) if config.score == BEST else instances.members()
         past = self.memory.observations.decisions(CALIBRATED_BY) if config.score == BEST else []
         context = Context(self.whitening, past, self._agreement if self._has_poses else None)
         decision = decide(members, self.encoded, config, context)

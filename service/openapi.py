@@ -8,7 +8,7 @@ from typing import Any
 from fastapi import FastAPI
 from pydantic.json_schema import models_json_schema
 
-from service.access import ACCESS
+from service.access import needed_role
 from service.exchange import KEY, LONGEST_KEY, MemoryRoute
 from service.schemas.bursts import BurstPart
 from service.schemas.goals import Seen
@@ -57,7 +57,7 @@ def install(app: FastAPI, routes: list[Any]) -> None:
         for method, operation in _operations(document):
             if operation["operationId"] in remembered:
                 _complete(method, operation)
-            if (role := ACCESS[operation["operationId"]]) is not None:
+            if (role := needed_role(operation["operationId"])) is not None:
                 _secure(operation, role)
         return document
 

@@ -7,15 +7,13 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from core.agreement import agreeing
-from core.coherence import require_one_unit
 from core.errors import InvalidInput, TooFewViews
+from core.look import Encodes, look
 from core.packing import burst_from_arrays
 from core.quality import ViewFault, faults, region_of_mask, region_of_sphere
 from core.reference import MIN_VIEWS, build_reference
 from core.scan import Coverage, ScanOptions, ScanRequest, coverage, exclude, request_scan
 from core.views import Burst, View
-from service.compute import Encodes
 from service.events import Events
 from store.memory import Memory
 from store.records import Category, Scan
@@ -48,8 +46,7 @@ class Scanning:
         if isinstance(source, str):
             encoded, observation_id = burst_from_arrays(self._memory.observations.features(source)), source
         else:
-            encoded, observation_id = agreeing(self._encoder.encode(source)), None
-            require_one_unit(encoded)
+            encoded, observation_id = look(source, self._encoder).encoded, None
         request = request_scan(encoded, options or ScanOptions(self._viewpoints))
         scan = self._memory.scans.create(request, observation_id)
         self._events.publish("scan_begun", id=scan.id, observation_id=observation_id)
@@ -88,8 +85,7 @@ class Scanning:
         if burst is None or len(burst) < MIN_VIEWS:
             found = f"the scan has {scan.views} of at least {MIN_VIEWS} views"
             raise TooFewViews("views", f"{found}; send {MIN_VIEWS - scan.views} more to /v1/scans/{scan_id}/views, from other sides")
-        encoded = agreeing(self._encoder.encode(burst))
-        require_one_unit(encoded)
+        encoded = look(burst, self._encoder).encoded
         category = self._memory.categories.create(build_reference(encoded), burst, encoded, name=name, scan_id=scan_id, actor=actor)
         self._events.publish("category_created", id=category.id, name=name, scan_id=scan_id)
         return category

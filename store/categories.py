@@ -9,11 +9,8 @@ from pathlib import Path
 import numpy as np
 from sqlite_utils import Database
 
-from core.backbones.whitening import Whitening
 from core.encode import EncodedBurst
-from core.enrolled import Enrolled
 from core.errors import Conflict, InvalidInput, NotFound
-from core.novelty import Member
 from core.reference import Reference
 from core.views import Burst, View
 from store.arrays import arrays_file, read_arrays, write_arrays
@@ -144,14 +141,6 @@ class Categories:
         self._require_part(category_id, moved)
         self._connection.create(self.folder(part_id), reference_files(reference, burst), insert, made=part_id)
         return self.get(part_id)
-
-    def enrolled(self, whitening: Whitening | None) -> Enrolled:
-        """See `Instances.enrolled`."""
-        return self._instances.enrolled(whitening)
-
-    def members(self) -> list[Member]:
-        """Tokens of every burst assigned to a category, oldest first; see `Instances.members`."""
-        return self._instances.members()
 
     def reference(self, category_id: str) -> Reference:
         """Raises NotFound, and Unavailable where its file is damaged."""

@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 from core.affine9 import Affine9
 from core.boxes import OrientedBox
 from core.grounds import Grounds
-from core.matches import Alternative
+from core.matches import Alternative, PoseEstimate
 from core.novelty import Decision
+from core.reference import Reference
 from core.scan import ScanRequest
 from core.sim3 import Sim3
-from core.views import FloatArray
+from core.views import Burst, FloatArray
 
 Outcome = Literal["known", "uncertain", "novel"]
 ScanState = Literal["requested", "collecting", "completed", "expired"]
@@ -151,6 +152,26 @@ class Pose:
     not_9d_because: str | None = None
     symmetries: FloatArray = field(default_factory=lambda: np.empty((0, 3, 3)))
     """The reference's, about its box's centre: turned by any of them, the pose means the same. Shape (S, 3, 3)."""
+
+    @staticmethod
+    def of(estimate: PoseEstimate, reference: Reference, burst: Burst) -> Pose:
+        """What is kept of an estimate for the object of a burst."""
+        box = estimate.box(reference.box)
+        return Pose(
+            target_from_reference=estimate.target_from_reference,
+            box=box,
+            inliers=estimate.inliers,
+            correspondences=len(estimate.matches),
+            best_view=estimate.matches.best_pair(estimate.pairs)[1],
+            residual_m=estimate.residual_m,
+            score=estimate.score,
+            confidence=estimate.confidence,
+            alternatives=estimate.alternatives,
+            boxes_px=tuple(view.camera and box.within_image(view.camera, view.size) for view in burst.views),
+            target_from_object=estimate.target_from_object,
+            not_9d_because=estimate.not_9d_because,
+            symmetries=reference.symmetries,
+        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -84,7 +84,7 @@ def _measure(probe: Probe) -> GrowthRow:
         decisions = [decision for _, decision in again]
         names = [members[category].category_id for category in probe.right]
         exact = _exact(memory, probe, whitening) if probe.exact else None
-        few = memory.categories.enrolled(whitening).exact
+        few = memory.instances.enrolled(whitening).exact
         _insert(probe.folder, [probe.novel])
         learnt, _ = _timed(partial(decide, memory, probe.known[-1]))
         memory.categories.delete(memory.instances.listed()[-1].category_id)

@@ -68,7 +68,7 @@ class RemoteEncoder:
 
     def encode(self, burst: Burst) -> EncodedBurst:
         """Raises as `core.encode.Encoder.encode` does, Unavailable, and CalledOff."""
-        encoded: EncodedBurst = _answer(lambda: self._encoders.encode.remote(burst))
+        encoded: EncodedBurst = _result(lambda: self._encoders.encode.remote(burst))
         return encoded
 
 
@@ -83,13 +83,13 @@ class RemoteSolver:
     def estimate(self, named: Named, config: PoseConfig, target: EncodedBurst, *, seed: int) -> PoseEstimate:
         """Raises as `core.pose.PoseEstimator.estimate` does, Unavailable, and CalledOff."""
         published = self._publish(named)
-        estimate: PoseEstimate = _answer(lambda: self._solvers.estimate.remote(published, named.category_id, config, target, seed))
+        estimate: PoseEstimate = _result(lambda: self._solvers.estimate.remote(published, named.category_id, config, target, seed))
         return estimate
 
     def verify(self, named: Named, target: EncodedBurst, whitening: Whitening | None, *, seed: int) -> tuple[PoseEstimate, float]:
         """Raises as `core.verification.verify` does, Unavailable, and CalledOff."""
         published = self._publish(named)
-        verified: tuple[PoseEstimate, float] = _answer(
+        verified: tuple[PoseEstimate, float] = _result(
             lambda: self._solvers.verify.remote(published, named.category_id, target, whitening, seed)
         )
         return verified
@@ -105,7 +105,7 @@ class RemoteSolver:
             return self._published[named.category_id]
 
 
-def _answer(ask: Callable[[], Any]) -> Any:
+def _result(ask: Callable[[], Any]) -> Any:
     """In a thread of the work queue."""
     for attempt in range(1, ATTEMPTS + 1):
         try:

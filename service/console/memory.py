@@ -57,7 +57,7 @@ def _charts(agent: Agent) -> list[tuple[bool, ScoreChart]]:
 def memory_map(request: Request, agent: AgentDep) -> HTMLResponse:
     """The memory's tokens in a plane: a part of its page, since it reads them all."""
     names = agent.names()
-    return render(request, "memory_map.html", map=token_map(agent.memory.categories.members(), names), names=names)
+    return render(request, "memory_map.html", map=token_map(agent.memory.instances.members(), names), names=names)
 
 
 @router.post("/calibrate")

@@ -18,7 +18,7 @@ from service.console.evidence import Hypothesis, Matrix, Stage
 from service.console.pages import Page, render
 from service.console.words import called
 from service.deps import AgentDep, WorkDep
-from service.features import best_pair, pose_details_from_arrays
+from service.features import pose_details_from_arrays
 from store.records import Observation, Outcome
 
 router = APIRouter(prefix="/observations", route_class=Page, include_in_schema=False)
@@ -144,4 +144,4 @@ def _evidence(agent: Agent, seen: Observation) -> dict[str, Any]:
         return none | {"damage": str(error)}
     if details is None or not details.pairs:
         return none
-    return {"matrix": Matrix.of(details), "view": best_pair(details.pairs, details.matches)[1], "damage": None}
+    return {"matrix": Matrix.of(details), "view": details.matches.best_pair(details.pairs)[1], "damage": None}

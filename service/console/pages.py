@@ -14,7 +14,7 @@ from fastapi.responses import HTMLResponse, RedirectResponse
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from core.errors import OneLookError
-from service.auth import Answer, Caller, GuardedRoute, NoKey
+from service.auth import Answering, Caller, GuardedRoute, NoKey
 from service.console.assets import asset_url
 from service.console.words import FILTERS
 from service.errors import problem_of, validation_problem
@@ -78,7 +78,7 @@ class Page(GuardedRoute):
 
     kind = "console_"
 
-    def get_route_handler(self) -> Answer:
+    def get_route_handler(self) -> Answering:
         """The guarded one, with that around it."""
         answer = super().get_route_handler()
 

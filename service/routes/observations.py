@@ -24,19 +24,20 @@ from store import records
 router = APIRouter(prefix="/v1/observations", tags=["observations"], route_class=MemoryRoute)
 
 ViewIndex = Annotated[int, Query(ge=0, description="Which of the burst's views, from 0.")]
-Answer = Observation | Detection3DArray
+Shown = Observation | Detection3DArray
+"""An observation in the shape that was asked for."""
 
 
 @router.post("", status_code=201, responses=problems(404, 413, 415, 422, 503), openapi_extra={"requestBody": BURST_BODY})
-async def observe(upload: UploadDep, query: Annotated[NewObservationQuery, Query()], agent: AgentDep, work: WorkDep) -> Answer:
+async def observe(upload: UploadDep, query: Annotated[NewObservationQuery, Query()], agent: AgentDep, work: WorkDep) -> Shown:
     """Decides what a burst shows: a known object is answered with its pose and joins its category, a novel one with a scan to carry out."""
     options = query.options()
 
-    def decide() -> Answer:
+    def look() -> Shown:
         sent = upload()
-        return _answer(agent, agent.observe(_first_views(sent.burst, query.views_used), options, frame=sent.frame), query)
+        return _as_asked(agent, agent.observe(_first_views(sent.burst, query.views_used), options, frame=sent.frame), query)
 
-    return await work.run(decide)
+    return await work.run(look)
 
 
 @router.get("", responses=problems(404, 422))
@@ -49,20 +50,20 @@ def list_observations(
 ) -> ObservationList:
     """The latest observations, newest first."""
     found = agent.memory.observations.latest(limit, before=before, category_id=category_id, outcome=outcome)
-    return ObservationList(observations=[_observation(agent, seen) for seen in found])
+    return ObservationList(observations=[_as_json(agent, seen) for seen in found])
 
 
 @router.get("/{observation_id}", responses=problems(404, 422))
-def get_observation(observation_id: str, query: Annotated[AnswerQuery, Query()], agent: AgentDep) -> Answer:
+def get_observation(observation_id: str, query: Annotated[AnswerQuery, Query()], agent: AgentDep) -> Shown:
     """What was answered then."""
-    return _answer(agent, agent.memory.observations.get(observation_id), query)
+    return _as_asked(agent, agent.memory.observations.get(observation_id), query)
 
 
 @router.post("/{observation_id}/correct", responses=problems(404, 409, 422, 503))
 async def correct_observation(observation_id: str, correction: Correction, agent: AgentDep, work: WorkDep, actor: ActorDep) -> Observation:
     """Says what it was really of: its burst joins that category and leaves the one it had joined; null makes a new one of its views."""
     said = correction.category_id, correction.name
-    return await work.run(lambda: _observation(agent, agent.curation.correct(observation_id, *said, actor=actor)))
+    return await work.run(lambda: _as_json(agent, agent.curation.correct(observation_id, *said, actor=actor)))
 
 
 @router.get("/{observation_id}/rgb.png", response_class=Response, responses=PNG_RESPONSES)
@@ -110,20 +111,20 @@ def _first_views(burst: Burst, count: int | None) -> Burst:
 
 def observation(agent: Agent, observation_id: str) -> Observation:
     """As JSON."""
-    return _observation(agent, agent.memory.observations.get(observation_id))
+    return _as_json(agent, agent.memory.observations.get(observation_id))
 
 
 MADE = {"/v1/observations": observation, "/v1/observations/{observation_id}/correct": observation}
 """What a repeated request is answered with where its first answer was lost."""
 
 
-def _answer(agent: Agent, seen: records.Observation, query: AnswerQuery) -> Answer:
+def _as_asked(agent: Agent, seen: records.Observation, query: AnswerQuery) -> Shown:
     if query.format == "vision_msgs":
         return Detection3DArray.of(seen, agent.names())
-    return _observation(agent, seen, debug="debug" in query.include)
+    return _as_json(agent, seen, debug="debug" in query.include)
 
 
-def _observation(agent: Agent, seen: records.Observation, *, debug: bool = False) -> Observation:
+def _as_json(agent: Agent, seen: records.Observation, *, debug: bool = False) -> Observation:
     scan = scan_answer(agent, agent.memory.scans.get(seen.scan_id)) if seen.scan_id else None
     return Observation.of(seen, agent.names(), scan, _debug(agent, seen.id) if debug else None)
 

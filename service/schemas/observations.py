@@ -6,6 +6,7 @@ Letters: M reference views, N views of the burst.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import fields
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -66,18 +67,17 @@ class ObserveQuery(BaseModel):
 
     def options(self) -> ObserveOptions:
         """As the agent has them."""
-        pose = PoseOptions(self.dims, self.method, self.consensus_deg, self.inlier_ratio, self.estimator, self.dof)
         return ObserveOptions(
-            self.category_id,
-            self.threshold,
-            self.false_known_rate,
-            self.looks,
-            self.variant,
-            pose,
-            self.alternatives,
-            self.learn,
-            as_up(self.up),
-            self.seed,
+            category_id=self.category_id,
+            threshold=self.threshold,
+            false_known_rate=self.false_known_rate,
+            looks=self.looks,
+            variant=self.variant,
+            pose=PoseOptions(**{each.name: getattr(self, each.name) for each in fields(PoseOptions)}),
+            alternatives=self.alternatives,
+            learn=self.learn,
+            up=as_up(self.up),
+            seed=self.seed,
         )
 
 

@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 import inspect
+from importlib import import_module
+from pkgutil import iter_modules
 from typing import Any
 
 import numpy as np
 
+import clients.calls
 from clients.asynchronous import AsyncRobotClient
-from clients.calls import curating, observing, operating, rearranging, scanning
 from clients.calls.call import Call
+from clients.calls.observing import observe
 from clients.robot import RobotClient, Scan
 from core.views import Burst, View
 from service.app import create_app
+from service.schemas.observations import ObserveQuery
 from service.settings import Settings
 
-MODULES = (curating, observing, operating, rearranging, scanning)
+MODULES = [import_module(f"clients.calls.{file.name}") for file in iter_modules(clients.calls.__path__) if file.name != "call"]
 EXAMPLES: dict[str, Any] = {
     "burst": Burst([View(np.zeros((32, 32, 3), np.uint8))]),
     "source": "o",
@@ -62,6 +66,11 @@ def test_every_endpoint_but_pictures_is_a_call() -> None:
     endpoints = {(method.upper(), path) for path, methods in paths.items() for method in methods if not path.endswith(".png")}
     made = {(call.method, call.path) for name, call in calls().items() if name != "picture"}
     assert endpoints - set(ELSEWHERE) == made
+
+
+def test_every_option_of_an_observation_is_one_of_its_call() -> None:
+    given = {each.name for each in inspect.signature(observe).parameters.values() if each.kind is each.KEYWORD_ONLY}
+    assert given - {"frame", "debug", "exact"} == set(ObserveQuery.model_fields)
 
 
 def test_every_call_is_a_method_of_both_clients() -> None:

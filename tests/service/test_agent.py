@@ -12,7 +12,7 @@ from service.agent import Agent, AgentConfig, ObserveOptions
 from service.compute import local
 from store.memory import Memory
 
-CONFIG = AgentConfig("pooled_best_view", 0.7)
+CONFIG = AgentConfig("pooled_best_view", 0.7, variant="ucd")
 
 
 @pytest.fixture

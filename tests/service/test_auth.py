@@ -15,7 +15,7 @@ from clients.errors import PROBLEMS, NoKeyProblem, NotAllowedProblem, TooOftenPr
 from clients.exchange import Retry
 from clients.robot import RobotClient
 from core.views import Burst
-from service.access import ACCESS
+from service.access import ACCESS, needed_role
 from service.app import create_app
 from service.errors import KINDS
 from service.rate import RateLimit
@@ -92,6 +92,11 @@ def test_the_table_has_every_operation_and_nothing_else() -> None:
     console = {name for name in ACCESS if name.startswith("console_")}
     known = {operation["operationId"] for methods in DOCUMENT["paths"].values() for operation in methods.values()}
     assert set(ACCESS) - console == known | {"track"}
+
+
+def test_a_route_that_the_table_lacks_is_told_where_the_table_is():
+    with pytest.raises(LookupError, match=r"'things'.*service/access\.py"):
+        needed_role("things")
 
 
 def test_the_scheme_is_documented() -> None:

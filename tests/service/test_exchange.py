@@ -8,12 +8,20 @@ import pytest
 from fastapi.testclient import TestClient
 
 from service.app import create_app
+from service.exchange import MemoryRoute
+from service.routes.install import ROUTERS
 
 KEY = {"Idempotency-Key": "4f1c"}
 
 
 def observations(client):
     return client.get("/v1/observations").json()["observations"]
+
+
+def lose_answers(client):
+    """As if the process had ended between what it did and what it said."""
+    with client.app.state.agent.memory._connection.housekeeping() as db:
+        db.execute("UPDATE requests SET status = NULL, media_type = NULL, body = NULL")
 
 
 def test_a_repeated_observation_is_answered_again_and_kept_once(client, look, parts):
@@ -75,11 +83,27 @@ def test_a_restarted_service_knows_the_key(settings, backbone, look, parts):
 
 def test_an_answer_lost_with_the_process_is_made_again_from_what_was_kept(client, look, parts):
     first = client.post("/v1/observations", files=parts(look()), headers=KEY).json()
-    with client.app.state.agent.memory._connection.housekeeping() as db:
-        db.execute("UPDATE requests SET status = NULL, media_type = NULL, body = NULL")
+    lose_answers(client)
     again = client.post("/v1/observations", files=parts(look()), headers=KEY)
     assert (again.status_code, again.json()) == (200, first)
     assert len(observations(client)) == 1
+
+
+def test_whatever_is_made_can_be_answered_again(client):
+    made = {
+        route.path_format for router in ROUTERS for route in router.routes if isinstance(route, MemoryRoute) and route.status_code == 201
+    }
+    assert "/v1/observations" in made
+    assert made <= set(client.app.state.made)
+
+
+def test_a_plan_lost_with_the_process_is_made_anew(client, learn, look, parts):
+    goal = client.post(f"/v1/categories/{learn()['id']}/goals", files=parts(look())).json()
+    path = f"/v1/goals/{goal['id']}/plan"
+    first = client.post(path, files=parts(look()), headers=KEY).json()
+    lose_answers(client)
+    again = client.post(path, files=parts(look()), headers=KEY)
+    assert (again.status_code, again.json()["goal_from_current"]) == (200, first["goal_from_current"])
 
 
 def test_the_same_request_twice_at_once_is_done_once(settings, backbone, look, parts):

@@ -13,7 +13,7 @@ from store.memory import Memory
 def agent(tmp_path, backbone, look):
     """An agent that knows one kind of object."""
     with Memory.open(tmp_path / "memory") as memory:
-        made = Agent(local(backbone), memory, AgentConfig("best", variant="best"))
+        made = Agent(local(backbone), memory, AgentConfig("best"))
         scan = made.scanning.begin(look())
         made.scanning.add(scan.id, look())
         made.scanning.complete(scan.id)

@@ -73,7 +73,7 @@ def test_a_known_object_joins_its_category(client, look, parts, learn):
     category = learn()
     seen = client.post("/v1/observations", files=parts(look(views=3))).json()
     assert client.get(f"/v1/categories/{category['id']}").json()["instances"] == 2
-    joined = client.app.state.agent.memory.categories.members()[-1]
+    joined = client.app.state.agent.memory.instances.members()[-1]
     assert (joined.category_id, len(joined.cls)) == (seen["category_id"], 3)
 
 

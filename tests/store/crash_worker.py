@@ -42,7 +42,7 @@ Known = dict[str, list[Any]]
 def state(memory: Memory, asked: EncodedBurst) -> Known:
     """What the memory knows and how it answers."""
     names = {category.id: category for category in memory.categories.all()}
-    found = decide(memory.categories.members(), asked, DecisionConfig("pooled_best_view")).similarities
+    found = decide(memory.instances.members(), asked, DecisionConfig("pooled_best_view")).similarities
     return {str(names[each].name): [names[each].instances, similarity] for each, similarity in found}
 
 

@@ -48,7 +48,7 @@ def test_memories_imported_into_each_other_answer_alike(
     names = [{category.id: category.name for category in memory.categories.all()} for memory in (learnt, second)]
     for score in SCORES:
         for asked in (encoded, turned):
-            answers = [decide(memory.categories.members(), asked, DecisionConfig(score)) for memory in (learnt, second)]
+            answers = [decide(memory.instances.members(), asked, DecisionConfig(score)) for memory in (learnt, second)]
             assert answers[0].outcome == answers[1].outcome
             told = [sorted((own[each], similarity) for each, similarity in answer.similarities) for own, answer in zip(names, answers)]
             assert told[0] == told[1]

@@ -38,7 +38,7 @@ def test_a_view_it_does_not_have_is_refused(memory: Memory, category: Category, 
 
 
 def test_its_first_member_is_the_scan(memory: Memory, category: Category, encoded: EncodedBurst) -> None:
-    (member,) = memory.categories.members()
+    (member,) = memory.instances.members()
     assert member.category_id == category.id
     assert np.array_equal(member.cls, encoded.cls)
     assert np.array_equal(member.pooled, encoded.pooled)
@@ -51,7 +51,7 @@ def test_renaming(memory: Memory, category: Category) -> None:
 
 def test_a_deleted_category_is_gone(memory: Memory, category: Category) -> None:
     memory.categories.delete(category.id)
-    assert memory.categories.members() == []
+    assert memory.instances.members() == []
     with pytest.raises(NotFound):
         memory.categories.get(category.id)
 

@@ -66,7 +66,7 @@ def test_a_damaged_category_stops_neither_its_recognition_nor_the_others(full: M
     with pytest.raises(Unavailable):
         full.categories.reference(category.id)
     assert len(full.categories.reference(other.id).views) == 3
-    assert {member.category_id for member in full.categories.members()} == {category.id, other.id}
+    assert {member.category_id for member in full.instances.members()} == {category.id, other.id}
     full.close()
     with Memory.open(full.folder) as again:
         assert len(again.categories.all()) == 2

@@ -145,7 +145,7 @@ def test_a_slow_disk_makes_writers_wait_and_nobody_else(disk, filled, changes):
     writer.start()
     assert reached.wait(LONG_S)
     assert len(filled.observations.latest(9)) == 1
-    assert len(filled.categories.members()) == 2
+    assert len(filled.instances.members()) == 2
     filled.categories.rename(filled.categories.all()[0].id, "meanwhile")
     slow.set()
     writer.join()
@@ -176,7 +176,7 @@ def test_a_clock_that_jumps_takes_nothing_that_was_learnt(filled, changes, monke
     filled.prune()
     assert [(each.id, each.name, each.instances) for each in filled.categories.all()] == known
     assert [each.id for each in filled.observations.latest(9)] == seen
-    assert len(filled.categories.members()) == 2
+    assert len(filled.instances.members()) == 2
     assert filled.scans.get(scan.id).state == ("expired" if jump > timedelta(0) else "collecting")
     changes["observe"]()
     monkeypatch.undo()

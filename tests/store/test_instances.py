@@ -84,12 +84,12 @@ def test_views_end_with_their_observation_but_tokens_stay(folder, reference: Ref
         assert (kept.kept, kept.source_id) == (True, second.id)
         with pytest.raises(Unavailable, match="no longer kept"):
             memory.instances.burst(dropped.id)
-        assert len(memory.categories.members()) == 3
+        assert len(memory.instances.members()) == 3
 
 
 def test_a_forgotten_one_is_no_member(memory: Memory, category: Category, joined: Instance) -> None:
     memory.instances.forget(category.id, joined.id)
-    assert len(memory.categories.members()) == 1
+    assert len(memory.instances.members()) == 1
     assert memory.categories.get(category.id).instances == 1
     with pytest.raises(NotFound):
         memory.instances.get(joined.id)
@@ -110,7 +110,7 @@ def test_only_of_its_own_category(memory: Memory, joined: Instance, other: Categ
 def test_merging_moves_every_burst(memory: Memory, category: Category, joined: Instance, other: Category) -> None:
     merged = memory.categories.merge(category.id, other.id)
     assert (merged.id, merged.name, merged.instances) == (other.id, "mug", 3)
-    assert {member.category_id for member in memory.categories.members()} == {other.id}
+    assert {member.category_id for member in memory.instances.members()} == {other.id}
     assert [each.id for each in memory.categories.all()] == [other.id]
 
 
@@ -145,7 +145,7 @@ def test_a_part_is_neither_nothing_nor_all_nor_another_s(
 def test_damaged_tokens_are_left_out_and_the_rest_goes_on(memory: Memory, category: Category, joined: Instance, caplog) -> None:
     with memory._connection.change() as db:
         db.execute("UPDATE instances SET cls = zeroblob(4) WHERE id = ?", [joined.id])
-    assert len(memory.categories.members()) == 1
+    assert len(memory.instances.members()) == 1
     assert joined.id in caplog.text
 
 
@@ -182,10 +182,10 @@ def test_opening_reads_no_tokens_and_a_decision_only_those_near(folder: Path, en
     fill(folder, encoded, 1000)
     with Memory.open(folder) as memory:
         assert reads == []
-        decide(memory.categories.enrolled(None), encoded)
+        decide(memory.instances.enrolled(None), encoded)
         first = len(reads)
         assert first <= ADAPTED_FROM + NEAREST * (NEAREST + 2)
-        decide(memory.categories.enrolled(None), encoded)
+        decide(memory.instances.enrolled(None), encoded)
         assert len(reads) == first
 
 
@@ -213,5 +213,5 @@ def test_a_decision_leaves_out_damaged_patches(memory: Memory, category: Categor
         db.execute("UPDATE instances SET patches = zeroblob(length(patches)) WHERE id = ?", [joined.id])
     connection.close()
     for _ in range(2):
-        assert decide(memory.categories.enrolled(None), encoded).similarities[0][0] == category.id
+        assert decide(memory.instances.enrolled(None), encoded).similarities[0][0] == category.id
     assert caplog.text.count("are damaged and left out") == 1

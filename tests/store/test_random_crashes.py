@@ -78,7 +78,7 @@ def found(memory: Memory) -> Known:
     for category_id, name in names.items():
         assert name not in known.categories
         known.categories[name] = {"instances": [], "goals": sorted(goal.name for goal in memory.goals.of(category_id))}
-    for member in memory.categories.members():
+    for member in memory.instances.members():
         known.categories[names[member.category_id]]["instances"].append(int(member.pooled[0, 0]))
     for about in known.categories.values():
         about["instances"].sort()

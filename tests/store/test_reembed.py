@@ -80,12 +80,12 @@ def test_everything_is_what_the_other_backbone_makes(learnt: Memory, category: C
     assert told == [(1, 2), (2, 2)]
     assert (learnt.backbone, learnt.fingerprint, learnt.setting("threshold")) == ("hue", "hue-1", None)
     expected = Encoder(other).encode(cup)
-    for member in learnt.categories.members():
+    for member in learnt.instances.members():
         np.testing.assert_allclose(member.pooled, expected.pooled, atol=1e-4)
     reference = learnt.categories.reference(category.id)
     assert reference.fingerprint == "hue-1"
     np.testing.assert_allclose(reference.views[0].descriptors, expected.views[0].descriptors, atol=2e-3)
-    assert decide(learnt.categories.members(), expected, DecisionConfig("pooled_best_view")).outcome == "known"
+    assert decide(learnt.instances.members(), expected, DecisionConfig("pooled_best_view")).outcome == "known"
     (seen,) = learnt.observations.latest(1)
     assert str(learnt.observations.features(seen.id)["fingerprint"]) == "hue-1"
 
@@ -139,7 +139,7 @@ def test_bursts_whose_views_are_gone_are_dropped(learnt: Memory, category: Categ
     assert learnt.reembed(other, burst_as_arrays).dropped_instances == 2
     (of_reference,) = learnt.instances.of(category.id)
     assert of_reference.kept
-    assert len(learnt.categories.members()) == 1
+    assert len(learnt.instances.members()) == 1
 
 
 def test_the_same_backbone_mends_damaged_arrays(learnt: Memory, category: Category, backbone: Backbone) -> None:
@@ -160,7 +160,7 @@ def test_what_is_in_the_bin_comes_back_with_the_other_backbone_too(learnt: Memor
     learnt.reembed(other, burst_as_arrays)
     learnt.undo(entry.id)
     assert learnt.categories.reference(category.id).fingerprint == "hue-1"
-    assert len(learnt.categories.members()) == 2
+    assert len(learnt.instances.members()) == 2
 
 
 def test_an_export_after_it_is_of_the_other_backbone(learnt: Memory, other: Backbone, tmp_path: Path) -> None:
@@ -178,9 +178,9 @@ def test_the_views_it_read_are_untouched(learnt: Memory, category: Category, oth
 
 def test_tokens_of_the_first_backbone_are_not_remembered(learnt: Memory, other: Backbone, cup: Burst, backbone: Backbone) -> None:
     before: EncodedBurst = Encoder(backbone).encode(cup)
-    assert decide(learnt.categories.members(), before, DecisionConfig("pooled_best_view")).similarities[0][1] > 0.99
+    assert decide(learnt.instances.members(), before, DecisionConfig("pooled_best_view")).similarities[0][1] > 0.99
     learnt.reembed(other, burst_as_arrays)
-    assert decide(learnt.categories.members(), before, DecisionConfig("pooled_best_view")).similarities[0][1] < 0.9
+    assert decide(learnt.instances.members(), before, DecisionConfig("pooled_best_view")).similarities[0][1] < 0.9
 
 
 def test_an_observation_that_cannot_be_computed_goes_with_its_burst(learnt: Memory, category: Category, other: Backbone) -> None:

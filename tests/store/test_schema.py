@@ -50,7 +50,7 @@ def test_what_was_learnt_is_still_known(upgraded: Memory, cup: Category, referen
     found = upgraded.categories.reference(cup.id)
     assert np.array_equal(found.cloud_m, reference.cloud_m)
     assert np.array_equal(found.views[1].points_m, reference.views[1].points_m)
-    for member in upgraded.categories.members():
+    for member in upgraded.instances.members():
         assert np.array_equal(member.cls, encoded.cls)
         assert np.array_equal(member.pooled, encoded.pooled)
 

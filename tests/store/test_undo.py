@@ -42,10 +42,10 @@ def test_undoing_a_name(memory: Memory, category: Category) -> None:
 def test_undoing_a_deletion_brings_everything_back(memory: Memory, category: Category, reference: Reference) -> None:
     memory.goals.create(category.id, "shelf", Sim3.identity())
     memory.categories.delete(category.id)
-    assert memory.categories.members() == []
+    assert memory.instances.members() == []
     memory.undo(last(memory).id)
     assert memory.categories.get(category.id).name == "cup"
-    assert len(memory.categories.members()) == 1
+    assert len(memory.instances.members()) == 1
     assert [goal.name for goal in memory.goals.of(category.id)] == ["shelf"]
     assert memory.categories.reference(category.id).views[0].grid == reference.views[0].grid
 

@@ -27,7 +27,7 @@ def prepared(tmp_path_factory, colour_backbone, look):
     """A memory that knows a cup by two bursts and a mug by one, and their ids."""
     folder = tmp_path_factory.mktemp("prepared") / "memory"
     with Memory.open(folder) as memory:
-        agent = Agent(local(colour_backbone), memory, AgentConfig(score="pooled_best_view"))
+        agent = Agent(local(colour_backbone), memory, AgentConfig(score="pooled_best_view", variant="ucd"))
         ids = {}
         for name, kind in (("cup", "bright"), ("mug", "dark")):
             scan = agent.scanning.begin(look(kind), ScanOptions(6))

@@ -6,14 +6,19 @@ import re
 
 import pytest
 
-PAGES = ("/", "/observations")
+from service.console.pages import NAVIGATION
+
+PAGES = [link.path for link in NAVIGATION]
 
 
 @pytest.mark.parametrize("path", PAGES)
 def test_pages_open_on_an_empty_memory(client, path):
-    answer = client.get(path)
-    assert answer.status_code == 200
-    assert "Nothing was looked at yet" in answer.text
+    assert client.get(path).status_code == 200
+
+
+@pytest.mark.parametrize("path", ["/", "/observations"])
+def test_an_empty_history_says_so(client, path):
+    assert "Nothing was looked at yet" in client.get(path).text
 
 
 @pytest.mark.parametrize("path", [*PAGES, "/observations/none", "/observations?outcome=odd"])
@@ -50,6 +55,6 @@ def test_names_are_text_and_never_markup(client, learn, look, parts):
     learn("bright", name)
     client.post("/v1/observations", files=parts(look()))
     for path in PAGES:
-        text = client.get(path).text
-        assert "<img src=x" not in text
-        assert "&lt;img src=x onerror=alert(1)&gt;" in text
+        assert "<img src=x" not in client.get(path).text
+    for path in ("/", "/categories", "/observations"):
+        assert "&lt;img src=x onerror=alert(1)&gt;" in client.get(path).text

@@ -1,0 +1,39 @@
+"""One look at an object: a burst as all that follows takes it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from core.agreement import agreeing
+from core.coherence import require_one_unit
+from core.encode import EncodedBurst
+from core.grounds import Grounds, grounds
+from core.views import Burst
+
+
+class Encodes(Protocol):
+    """Bursts in, tokens out."""
+
+    def encode(self, burst: Burst) -> EncodedBurst:
+        """See `core.encode.Encoder.encode`."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Look:
+    """What a burst shows."""
+
+    burst: Burst
+    encoded: EncodedBurst
+    """Without what its views contradict of each other."""
+    grounds: Grounds
+    """How much an answer about it rests on."""
+
+
+def look(burst: Burst, encoder: Encodes) -> Look:
+    """Raises NoObject where no view shows an object, InvalidInput where depth and cameras are in different units."""
+    found = encoder.encode(burst)
+    agreed = agreeing(found)
+    require_one_unit(agreed)
+    return Look(burst, agreed, grounds(burst, found, agreed))

@@ -1,0 +1,19 @@
+"""Puts the endpoints into the application."""
+
+from __future__ import annotations
+
+from fastapi import FastAPI
+
+from service import openapi
+from service.routes import categories, goals, health, memory, observations, scans, track
+
+ENDPOINTS = (observations, scans, categories, goals, memory, track, health)
+ROUTERS = (*(each.router for each in ENDPOINTS), memory.live)
+
+
+def install(app: FastAPI) -> None:
+    """All of them, their document, and what a repeated request is answered with where its first answer was lost (`MADE`)."""
+    for router in ROUTERS:
+        app.include_router(router)
+    openapi.install(app, [route for router in ROUTERS for route in router.routes])
+    app.state.made = {path: made for each in ENDPOINTS for path, made in getattr(each, "MADE", {}).items()}
