@@ -78,8 +78,8 @@ class Upkeep:
     def thresholds(self) -> Thresholds:
         """As they are now."""
         tokens, verified = self.distributions()
-        known_above = (each.levels.known_above for each in (tokens, verified))
-        return Thresholds(self.false_known_rate, *known_above, len(tokens.rivals) + len(verified.rivals))
+        least = [each.levels.known_above for each in (tokens, verified)]
+        return Thresholds(self.false_known_rate, least[0], least[1], len(tokens.rivals) + len(verified.rivals))
 
     def distributions(self) -> tuple[Distribution, Distribution]:
         """What the thresholds of the score `best` rest on: from tokens alone, and with poses."""

@@ -167,7 +167,7 @@ class Pose:
             score=estimate.score,
             confidence=estimate.confidence,
             alternatives=estimate.alternatives,
-            boxes_px=tuple(view.camera and box.within_image(view.camera, view.size) for view in burst.views),
+            boxes_px=tuple(box.within_image(view.camera, view.size) if view.camera else None for view in burst.views),
             target_from_object=estimate.target_from_object,
             not_9d_because=estimate.not_9d_because,
             symmetries=reference.symmetries,
