@@ -108,7 +108,7 @@ class Sweep:
     consensus_deg: Sequence[float] | None = None
     inlier_ratios: Sequence[float] | None = None
     estimators: Sequence[str] | None = None
-    """Of `core.estimators.named.ESTIMATORS`."""
+    """Of `core.estimators.ESTIMATORS`."""
     dof: Sequence[int] | None = None
     """7 or 9."""
 

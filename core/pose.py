@@ -19,7 +19,7 @@ from core.dense import DenseAgreement, DenseConfig
 from core.descriptors import component_count
 from core.encode import EncodedBurst
 from core.errors import InvalidInput, NoPose
-from core.estimators.named import ESTIMATORS
+from core.estimators import ESTIMATORS
 from core.hypotheses import HypothesesConfig, distinct, propose
 from core.matched_pair import MatchedPair, require_comparable
 from core.matches import Alternative, PoseEstimate, pool
@@ -70,7 +70,7 @@ class PoseConfig:
     inlier_ratio: float = 0.08
     """Inlier threshold as a share of the target's extent."""
     estimator: str = "ransac"
-    """One of `core.estimators.named.ESTIMATORS`; of the solvers that fit correspondences."""
+    """One of `core.estimators.ESTIMATORS`; of the solvers that fit correspondences."""
     solver: Literal["retrieval", "single view", "umeyama", "agreement", "pnp"] = "umeyama"
     """From view pairs to a transform: the mean of their rotations, one pair alone, the paper's RANSAC, ours over many hypotheses, or
     the reference's points and the rays of target views without depth."""

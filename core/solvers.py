@@ -12,8 +12,8 @@ import numpy as np
 from core.affine9 import Affine9, fit_affine9
 from core.clock import StageClock
 from core.errors import NoPose
-from core.estimators.base import Estimator, refit
-from core.estimators.ransac import MAX_SCALE, REFITS
+from core.estimators.base import MAX_SCALE, Estimator, refit
+from core.estimators.ransac import REFITS
 from core.hypotheses import align_clouds
 from core.matched_pair import MatchedPair, Pairs
 from core.matches import Matches, PoseEstimate, end_points, pool

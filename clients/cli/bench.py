@@ -32,7 +32,7 @@ def pose(
     ] = None,
     consensus: Annotated[list[float] | None, typer.Option(help="Angle of the consensus, degrees; may be repeated.")] = None,
     inlier: Annotated[list[float] | None, typer.Option(help="Inlier threshold as a share of the extent; may be repeated.")] = None,
-    estimator: Annotated[list[str] | None, typer.Option(help="Robust estimator: ransac or pycolmap; may be repeated.")] = None,
+    estimator: Annotated[list[str] | None, typer.Option(help="Robust estimator, by its name in docs/method.md; may be repeated.")] = None,
     dof: Annotated[list[int] | None, typer.Option(help="7, or 9 with a scale for each axis; may be repeated.")] = None,
     seed: Seed = 0,
     backbone: Backbone = BACKBONE,

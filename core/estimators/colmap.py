@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
-from core.errors import NoPose, Unavailable
-from core.estimators.base import MIN_CORRESPONDENCES, FloatArray, RobustFit, refit
+from core.errors import Unavailable
+from core.estimators.base import MIN_CORRESPONDENCES, Estimator, FloatArray, RobustFit, no_agreement, refit, require_enough
 from core.sim3 import Sim3
 
 
@@ -15,12 +17,14 @@ def lo_ransac(source: FloatArray, target: FloatArray, threshold_m: float, seed: 
         import pycolmap
     except ImportError as error:
         raise Unavailable("estimator 'pycolmap' needs pycolmap, which is not installed: pip install 'onelook[colmap]'") from error
-    if len(source) < MIN_CORRESPONDENCES:
-        raise NoPose(f"{len(source)} correspondences with measured depth; at least {MIN_CORRESPONDENCES} are needed: send more views")
+    require_enough(source)
     options = pycolmap.RANSACOptions(max_error=threshold_m, random_seed=seed)
     found = pycolmap.estimate_sim3d_robust(np.asarray(source, dtype=np.float64), np.asarray(target, dtype=np.float64), options)
     if found is None or found["num_inliers"] < MIN_CORRESPONDENCES:
-        raise NoPose(f"no {MIN_CORRESPONDENCES} of {len(source)} correspondences agree on a transform; are these objects of one kind?")
+        raise no_agreement(source)
     similarity = found["tgt_from_src"]
     transform = Sim3(float(similarity.scale), np.asarray(similarity.rotation.matrix()), np.asarray(similarity.translation))
     return refit(source, target, transform, np.linalg.norm(transform.apply(source) - target, axis=1) < threshold_m)
+
+
+OFFERS: Mapping[str, Estimator] = {"pycolmap": lo_ransac}

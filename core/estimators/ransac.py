@@ -2,35 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
 from core.errors import NoPose
-from core.estimators.base import MIN_CORRESPONDENCES, FloatArray, RobustFit, refit
+from core.estimators.base import MAX_SCALE, MIN_CORRESPONDENCES, Estimator, FloatArray, RobustFit, no_agreement, refit, require_enough
 from core.estimators.batched import Sim3Batch, umeyama_batch
 from core.sim3 import Sim3, umeyama
 
 TRIALS = 1000
-MAX_SCALE = 4.0
-"""Objects of one category differ in size by less than this; a sample of near-coincident points does not."""
 REFITS = 3
 """Rounds of least squares on the inliers."""
 
 
 def ransac(source: FloatArray, target: FloatArray, threshold_m: float, seed: int) -> RobustFit:
     """The similarity with the largest inlier set, refitted to it. See `Estimator`."""
-    if len(source) < MIN_CORRESPONDENCES:
-        raise NoPose(
-            f"{len(source)} correspondences with measured depth; at least {MIN_CORRESPONDENCES} are needed: send more views or better depth"
-        )
+    require_enough(source)
     trials, inliers = sample(source, target, threshold_m, TRIALS, seed)
     if not len(trials):
         raise NoPose("every sample of correspondences is collinear or absurdly scaled; the views may show too little of the object")
     best = int(inliers.sum(dim=1).argmax())
     if inliers[best].sum() < MIN_CORRESPONDENCES:
-        raise NoPose(f"no {MIN_CORRESPONDENCES} of {len(source)} correspondences agree on a transform; are these objects of one kind?")
+        raise no_agreement(source)
     return polish(source, target, trials[best], inliers[best].numpy(), threshold_m)
 
 
@@ -73,3 +70,6 @@ def polish(source: FloatArray, target: FloatArray, transform: Sim3, inlier: NDAr
             break
         transform, inlier, cost = refined, errors < threshold_m, lower
     return refit(source, target, transform, inlier)
+
+
+OFFERS: Mapping[str, Estimator] = {"ransac": ransac}

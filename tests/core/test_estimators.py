@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from core.errors import NoPose, Unavailable
+from core.estimators import ESTIMATORS
 from core.estimators.base import Estimator
 from core.estimators.colmap import lo_ransac
-from core.estimators.named import ESTIMATORS
 from core.estimators.ransac import polish
 from core.sim3 import Sim3
 
 
-@pytest.fixture(params=ESTIMATORS)
+@pytest.fixture(params=sorted(ESTIMATORS))
 def fitted_by(request: pytest.FixtureRequest) -> Estimator:
     return ESTIMATORS[request.param]
 

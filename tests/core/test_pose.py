@@ -10,6 +10,7 @@ import pytest
 from core.correspond import METHODS
 from core.encode import EncodedBurst
 from core.errors import InvalidInput, TooFewViews
+from core.estimators import ESTIMATORS
 from core.pose import VARIANTS, PoseConfig, PoseEstimator, PoseOptions
 from core.reference import Reference, build_reference
 from core.sim3 import Sim3, rotation_angle_deg
@@ -45,7 +46,7 @@ def test_every_way_to_match(method: str, painted: PaintedObject, moved: Sim3) ->
     assert_recovered(estimate.target_from_reference, moved)
 
 
-@pytest.mark.parametrize("estimator", ["ransac", "pycolmap"])
+@pytest.mark.parametrize("estimator", sorted(ESTIMATORS))
 @pytest.mark.parametrize("dims", [48, 32, 24, 6, 3])
 def test_every_descriptor_size_and_estimator(dims: int, estimator: str, painted: PaintedObject, moved: Sim3) -> None:
     config = PoseConfig.named("ucd", PoseOptions(dims=dims, estimator=estimator, consensus_deg=15, inlier_ratio=0.05))
