@@ -24,15 +24,15 @@ from benchmarks.discovery_plot import plot
 from benchmarks.encoded import encode_all, read_views
 from benchmarks.episodes import Counts, SetSource, draw_orders, episode
 from benchmarks.matches import matches
-from benchmarks.pair_scores import PARTS, FloatArray, PairScores, auroc, hardest, nearest_accuracy, same_and_other
+from benchmarks.pair_scores import FloatArray, PairScores, auroc, hardest, nearest_accuracy, same_and_other
 from benchmarks.parallel import map_jobs
 from benchmarks.tables import Row, print_table, write_json
 from clients.datasets.sources import find_sequences
 from core.backbones.dino import load_backbone
 from core.calibration import Calibration, Prior
-from core.encode import Encoder
+from core.encode import EncodedBurst, Encoder
 from core.errors import InvalidInput
-from core.novelty import BEST, SCORES, require_score
+from core.scores import BEST, SCORES, require_score
 
 LEVELS = np.concatenate([np.linspace(0, 0.9, 7), 1 - np.geomspace(0.1, 0.001, 10)])
 """Quantiles of the similarities between bursts at which a curve has a threshold."""
@@ -108,7 +108,7 @@ def run(
     network = load_backbone(backbone)
     files = encode_all(sequences, Encoder(network))
     bursts = [read_views(file) for file in files]
-    tables: dict[str, PairScores | BestPairs] = {score: PairScores.of(bursts, score) for score in PARTS if score in (scores or PARTS)}
+    tables: dict[str, PairScores | BestPairs] = {**pair_tables(bursts, scores)}
     if not scores or BEST in scores:
         agreement = agreements(files, network.whitening) if poses else None
         best = BestPairs(matches(bursts, network.whitening), agreement, Prior.shipped())
@@ -144,6 +144,11 @@ def run(
     if rates:
         print_table("Threshold from a false-known rate", rates, RATE_COLUMNS)
     return rows + rates
+
+
+def pair_tables(bursts: Sequence[EncodedBurst], scores: Sequence[str]) -> dict[str, PairScores]:
+    """Of the scores that are named, or of all; `best` has tables of its own."""
+    return {name: PairScores.of(bursts, SCORES[name]) for name in scores or SCORES if name != BEST}
 
 
 def has_poses(pairs: BestPairs) -> bool:
@@ -258,6 +263,6 @@ def threshold_grid(name: str, pairs: PairScores | BestPairs, single: FloatArray,
     largest = float(between.max())
     trade = np.linspace(float(np.quantile(between, TRADE_ABOVE)), largest, TRADE)
     grid = [np.quantile(between, LEVELS), trade, np.linspace(largest, top, BEYOND), [own, top + TINY]]
-    if name == "paper_sum" and isinstance(pairs, PairScores):
-        grid.append(np.geomspace(top, pairs.total.sum(axis=0).max() * SUM_REACH + TINY, SUMS))
+    if isinstance(pairs, PairScores) and pairs.aggregation == "sum":
+        grid.append(np.geomspace(top, pairs.part.sum(axis=0).max() * SUM_REACH + TINY, SUMS))
     return np.unique(np.concatenate(grid))

@@ -95,16 +95,14 @@ class Source(Protocol):
 
 
 class SetSource:
-    """By a score of token sets: parts that add up, or take their maximum, over the members of a category."""
+    """By a score of `core.scores`."""
 
     def __init__(self, pairs: PairScores, room: int) -> None:
         self._pairs, self._room = pairs, room
 
     def begin(self, thresholds: int) -> None:
         """See `Source`."""
-        bursts, _, parts = self._pairs.best.shape
-        self._total = np.zeros((thresholds, self._room, bursts), dtype=np.float32)
-        self._best = np.full((thresholds, self._room, bursts, parts), -1, dtype=np.float32)
+        self._part = np.full((thresholds, self._room, len(self._pairs.part)), self._pairs.none, dtype=np.float32)
         self._views = np.zeros((thresholds, self._room), dtype=np.intp)
 
     def nearest(self, burst: int, used: NDArray[np.intp]) -> tuple[NDArray[np.intp], FloatArray]:
@@ -113,15 +111,14 @@ class SetSource:
         if not most:
             return np.zeros_like(used), np.full(len(used), -np.inf)
         views = np.maximum(self._views[:, :most], 1)
-        similarity = self._pairs.similarity(self._total[:, :most, burst], self._best[:, :most, burst], views, burst)
+        similarity = self._pairs.similarity(self._part[:, :most, burst], views)
         similarity = np.where(np.arange(most) < used[:, None], similarity, -np.inf)
         nearest = similarity.argmax(axis=1)
         return nearest, similarity[np.arange(len(used)), nearest]
 
     def learn(self, burst: int, chosen: NDArray[np.intp], rows: NDArray[np.intp]) -> None:
         """See `Source`."""
-        self._total[rows, chosen] += self._pairs.total[burst]
-        self._best[rows, chosen] = np.maximum(self._best[rows, chosen], self._pairs.best[burst])
+        self._part[rows, chosen] = self._pairs.joined(self._part[rows, chosen], self._pairs.part[burst])
         self._views[rows, chosen] += self._pairs.views[burst]
 
 

@@ -1,9 +1,9 @@
 """Similarities between every two bursts, and from them the similarity of any set of bursts to any burst.
 
-A category is a set of bursts. Each score of `core.novelty` is made of parts that add up, or take their maximum, over the
-members of the set; with those parts kept for every pair, thousands of episodes need no token again.
+A category is a set of bursts. What each of them has to do with a burst adds up, or the largest counts (`core.scores`); with that kept for
+every pair, thousands of episodes need no token again.
 
-Letters: N bursts, G parts of a pair, D token size; a leading * is any batch of sets.
+Letters: N bursts; a leading * is any batch of sets.
 """
 
 from __future__ import annotations
@@ -16,66 +16,48 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import rankdata
 
-from core.descriptors import unit
 from core.encode import EncodedBurst
-from core.errors import InvalidInput
-from core.novelty import SCORES, paper_sum
+from core.scores.base import Aggregation, Score
 
 FloatArray = NDArray[np.floating[Any]]
 
 
 @dataclass(frozen=True, eq=False)
 class PairScores:
-    """One score's parts for every ordered pair (member i, target j)."""
+    """One score's part for every ordered pair (member i, target j)."""
 
-    score: str
+    aggregation: Aggregation
     views: NDArray[np.intp]
     """Number of views of each burst, shape (N,)."""
-    total: FloatArray
-    """The part that adds up over members, shape (N, N): the sum of cosines."""
-    best: FloatArray
-    """The part that takes its maximum over members, shape (N, N, G); G is 0 where a score has none."""
+    part: FloatArray
+    """What a member gives to its category's similarity with a target, shape (N, N): their own, for a mean times the member's views."""
 
     @staticmethod
-    def of(bursts: Sequence[EncodedBurst], score: str) -> PairScores:
-        """Raises InvalidInput for a score of which the parts are not known here."""
-        if score not in PARTS:
-            raise InvalidInput("score", f"{score!r} is none of {', '.join(PARTS)}")
-        token = SCORES[score].token
-        tokens = [unit(getattr(burst, token)) for burst in bursts]
-        count, most = len(tokens), 1 if PARTS[score] == "maximum" else 0
-        total = np.zeros((count, count), dtype=np.float32)
-        best = np.zeros((count, count, most), dtype=np.float32)
-        for i, member in enumerate(tokens):
-            for j, target in enumerate(tokens):
-                if most:
-                    best[i, j] = SCORES[score].similarity(member, target)
-                else:
-                    total[i, j] = paper_sum(member, target)
-        return PairScores(score, np.array([len(each) for each in tokens]), total, best)
+    def of(bursts: Sequence[EncodedBurst], score: Score) -> PairScores:
+        """From the tokens of every burst."""
+        tokens = [score.tokens(burst) for burst in bursts]
+        views = np.array([len(each) for each in tokens])
+        part = np.array([[score.similarity(member, target) for target in tokens] for member in tokens])
+        if score.aggregation == "mean":
+            part *= views[:, None]
+        return PairScores(score.aggregation, views, part.astype(np.float32))
 
-    def similarity(self, total: FloatArray, best: FloatArray, views: NDArray[Any], target: int) -> FloatArray:
-        """Similarity of sets to burst `target`, shape (*).
+    @property
+    def none(self) -> float:
+        """The part of a set without members."""
+        return -np.inf if self.aggregation == "max" else 0.0
 
-        Args:
-            total: sum of the members' `total[:, target]`, shape (*).
-            best: maximum of the members' `best[:, target]`, shape (*, G).
-            views: the sets' numbers of views, shape (*).
-        """
-        if self.score == "paper_sum":
-            return total
-        if self.score == "paper_mean":
-            return np.asarray(total / (views * self.views[target]))
-        return best[..., 0]
+    def joined(self, part: FloatArray, more: FloatArray) -> FloatArray:
+        """The part of two sets together, from that of each, both of one shape."""
+        return np.asarray(np.maximum(part, more) if self.aggregation == "max" else part + more)
+
+    def similarity(self, part: FloatArray, views: NDArray[Any]) -> FloatArray:
+        """Similarity of sets to a burst, from their parts and their numbers of views, at least 1, both shape (*)."""
+        return np.asarray(part / views) if self.aggregation == "mean" else part
 
     def single(self) -> FloatArray:
         """Similarity of every burst alone to every burst, shape (N, N)."""
-        columns = [self.similarity(self.total[:, j], self.best[:, j], self.views, j) for j in range(len(self.views))]
-        return np.stack(columns, axis=1)
-
-
-PARTS = {"paper_sum": "sum", "paper_mean": "sum", "pooled_best_view": "maximum"}
-"""How each score adds up over the bursts of a category."""
+        return self.similarity(self.part, self.views[:, None])
 
 
 def auroc(positive: FloatArray, negative: FloatArray) -> float:

@@ -30,9 +30,10 @@ from core.encode import EncodedBurst, Encoder, EncoderConfig
 from core.errors import InvalidInput
 from core.evidence import sample_patches
 from core.matched_pair import MatchedPair
-from core.novelty import BEST, DEFAULT_SCORE, SCORE_NAMES, VERIFIED, Context, DecisionConfig, Member, decide
+from core.novelty import VERIFIED, Context, DecisionConfig, Member, decide
 from core.pose import VARIANTS, PoseConfig, PoseEstimator
 from core.reference import Reference, build_reference
+from core.scores import BEST, DEFAULT_SCORE, SCORES
 from core.verification import verify
 from core.views import Burst
 
@@ -102,7 +103,7 @@ def run(
     threshold_m = PoseConfig().inlier_ratio * cloud_extent_m(target.cloud_m)
     memory = [Member("reference", scanned.cls, scanned.pooled, sample_patches(scanned))]
     operations: dict[str, Operation] = {"encode": partial(_encode, encoder, target_burst), "learn": partial(_learn, scanned)}
-    operations |= {f"decide {score}": partial(_decide, memory, target, score) for score in SCORE_NAMES}
+    operations |= {f"decide {score}": partial(_decide, memory, target, score) for score in (BEST, *SCORES)}
     operations |= {f"decide {BEST}, {VERIFIED} poses": partial(_verify, memory[0], target, reference, network.whitening)}
     operations |= {f"solve {name}": partial(_solve, PoseEstimator(PoseConfig.named(name)), reference, target) for name in VARIANTS}
     operations |= {_more(name): partial(_solve, PoseEstimator(PoseConfig.named(name)), *many) for name in GROWING}

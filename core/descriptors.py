@@ -45,7 +45,7 @@ class PcaBasis:
         return (tokens - self.mean) @ self.components[:count].T
 
 
-def unit(vectors: FloatArray) -> FloatArray:
+def unit(vectors: NDArray[np.floating]) -> FloatArray:
     """Vectors scaled to length 1 along the last axis; zero stays zero."""
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
     return np.asarray(vectors / np.maximum(length, 1e-12), dtype=np.float32)

@@ -1,6 +1,6 @@
 """Known, uncertain or novel: a burst against every category (paper, "Continual category learning", and ours).
 
-Letters: F views of a category over all its bursts, G views of the target, V views, K patches of a view, D token size.
+Letters: V views, K patches of a view, D token size.
 """
 
 from __future__ import annotations
@@ -14,18 +14,17 @@ from numpy.typing import NDArray
 
 from core.backbones.whitening import Whitening
 from core.calibration import LARGEST_RATE, Calibration, Levels, Prior
-from core.descriptors import unit
 from core.encode import EncodedBurst
 from core.enrolled import Enrolled
 from core.errors import InvalidInput
 from core.evidence import Adaptation, Comparison, Entry, sample_patches, whitened
+from core.scores import BEST, DEFAULT_SCORE, SCORES, require_score
 
 FloatArray = NDArray[np.floating]
 Outcome = Literal["known", "uncertain", "novel"]
 Verify = Callable[[str], float]
 """How well the best pose of a category's reference explains the burst (`core.verification`), 0 where there is none."""
 
-BEST = "best"
 VERIFIED = 3
 """Categories whose poses are tried, those with the most evidence first."""
 
@@ -47,7 +46,7 @@ class Member:
 class DecisionConfig:
     """How to decide."""
 
-    score: str = BEST
+    score: str = DEFAULT_SCORE
     threshold: float | None = None
     """Least similarity of a known object, and no third answer; None leaves it to the rate, or to a paper score's own default."""
     false_known_rate: float = 0.01
@@ -107,56 +106,6 @@ class Decision:
         return replace(self, rival=max(wrong, default=None) if self.score == BEST else None)
 
 
-def paper_sum(category: FloatArray, target: FloatArray) -> float:
-    """f as the paper writes it: the sum of cosines over all view pairs, from unit tokens (F, D), (G, D).
-
-    It equals the dot product of the two sums, and grows with the number of views of either side.
-    """
-    return float(category.sum(axis=0) @ target.sum(axis=0))
-
-
-def paper_mean(category: FloatArray, target: FloatArray) -> float:
-    """`paper_sum` over the number of view pairs: a mean cosine, independent of how many views there are."""
-    return paper_sum(category, target) / (len(category) * len(target))
-
-
-def best_view(burst: FloatArray, target: FloatArray) -> float:
-    """Mean over views of the cosine to the other burst's most similar view, both directions, from unit tokens (F, D), (G, D).
-
-    Opposite sides of one object look unalike; averaging over them, as the paper's f does, hides a good match.
-    """
-    cosines = burst @ target.T
-    return float((cosines.max(axis=0).mean() + cosines.max(axis=1).mean()) / 2)
-
-
-@dataclass(frozen=True)
-class Score:
-    """A named similarity of token sets."""
-
-    token: Literal["cls", "pooled"]
-    similarity: Callable[[FloatArray, FloatArray], float]
-    over: Literal["views", "bursts"]
-    """`views`: a category is one set of tokens, as in the paper. `bursts`: it is as similar as its most similar burst."""
-    threshold: float
-    """Above it a burst is known."""
-
-
-SCORES = {
-    "paper_sum": Score("cls", paper_sum, "views", 80.0),
-    "paper_mean": Score("cls", paper_mean, "views", 0.8),
-    "pooled_best_view": Score("pooled", best_view, "bursts", 0.4),
-}
-"""Those that compare two sets of tokens and nothing else; `best` is not among them."""
-DEFAULT_SCORE = BEST
-SCORE_NAMES = (BEST, *SCORES)
-
-
-def require_score(name: str) -> None:
-    """Raises InvalidInput for an unknown score."""
-    if name not in SCORE_NAMES:
-        raise InvalidInput("score", f"{name!r} is none of {', '.join(SCORE_NAMES)}")
-
-
 @dataclass(frozen=True, eq=False)
 class Context:
     """What `best` knows beside the memory and the burst."""
@@ -181,22 +130,16 @@ def decide(
         return _by_evidence(memory, target, config, context or Context())
     if isinstance(memory, Enrolled):
         raise InvalidInput("score", f"{config.score} compares whole members, which are not enrolled; give it the members themselves")
-    named = SCORES[config.score]
-    limit = named.threshold if config.threshold is None else config.threshold
+    score = SCORES[config.score]
+    limit = score.threshold if config.threshold is None else config.threshold
     tokens: dict[str, list[FloatArray]] = {}
     for member in memory:
-        tokens.setdefault(member.category_id, []).append(getattr(member, named.token))
-    asked = unit(getattr(target, named.token))
-    similarities = {category: _similarity(named, [unit(each) for each in bursts], asked) for category, bursts in tokens.items()}
+        tokens.setdefault(member.category_id, []).append(score.tokens(member))
+    asked = score.tokens(target)
+    similarities = {category: score.of_category(bursts, asked) for category, bursts in tokens.items()}
     ranked = tuple(sorted(similarities.items(), key=lambda entry: (-entry[1], entry[0])))
     known = bool(ranked) and ranked[0][1] > limit
     return Decision("known" if known else "novel", config.score, limit, ranked, limit, limit)
-
-
-def _similarity(score: Score, bursts: Sequence[FloatArray], target: FloatArray) -> float:
-    if score.over == "views":
-        return score.similarity(np.concatenate(bursts), target)
-    return max(score.similarity(burst, target) for burst in bursts)
 
 
 def _by_evidence(memory: Sequence[Member] | Enrolled, target: EncodedBurst, config: DecisionConfig, context: Context) -> Decision:

@@ -7,12 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from core.descriptors import unit
 from core.errors import Conflict, InvalidInput, Unavailable
 from core.look import Encodes, look
-from core.novelty import SCORES, Member
 from core.packing import burst_from_arrays
 from core.reference import MIN_VIEWS, build_reference
+from core.scores import SCORES
 from core.views import Burst, FloatArray
 from service.events import Events
 from store.memory import Memory
@@ -147,7 +146,7 @@ class Curation:
         score = SCORES[self._score]
         bursts: dict[str, list[FloatArray]] = {}
         for member in self._memory.instances.members():
-            bursts.setdefault(member.category_id, []).append(unit(_tokens(member, score.token)))
+            bursts.setdefault(member.category_id, []).append(score.tokens(member))
         instances = tuple(self._memory.instances.of(category_id))
         own = bursts.pop(category_id, [])
         if len(own) != len(instances):
@@ -174,8 +173,3 @@ class Curation:
 def _sound(burst: Burst) -> list[int]:
     """Views that a reference can be made of."""
     return [index for index, view in enumerate(burst.views) if view.camera is not None and view.depth_m is not None]
-
-
-def _tokens(member: Member, token: str) -> FloatArray:
-    tokens: FloatArray = getattr(member, token)
-    return tokens

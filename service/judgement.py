@@ -12,8 +12,9 @@ from core.encode import EncodedBurst
 from core.errors import InvalidInput, NoObject, NoPose, Unavailable
 from core.matches import PoseEstimate
 from core.next_view import Candidate, next_viewpoints
-from core.novelty import BEST, Context, Decision, DecisionConfig, decide
+from core.novelty import Context, Decision, DecisionConfig, decide
 from core.reference import Reference
+from core.scores import BEST
 from service.compute import Named, Solves
 from service.turn import require_wanted
 from store.memory import Memory

@@ -12,7 +12,7 @@ from pydantic_settings import BaseSettings, SettingsConfigDict
 
 from core.backbones.dino import EMBEDDED
 from core.errors import InvalidInput
-from core.novelty import DEFAULT_SCORE
+from core.scores import DEFAULT_SCORE
 from service.logs import Form
 from store.retention import Retention
 

@@ -10,7 +10,8 @@ from pathlib import Path
 
 from core.calibration import Calibration, Levels, Prior
 from core.errors import Conflict
-from core.novelty import BEST, Decision
+from core.novelty import Decision
+from core.scores import BEST
 from service.events import Events
 from service.judgement import CALIBRATED_BY
 from store.backup import Backup

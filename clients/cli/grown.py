@@ -173,7 +173,8 @@ def _live_through(memory: Memory) -> None:
     """Decisions to be calibrated by, on an object as small as can be."""
     import numpy as np
 
-    from core.novelty import BEST, Decision
+    from core.novelty import Decision
+    from core.scores import BEST
     from core.views import Burst, View
     from store.observations import Answer
 

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 from fastapi import APIRouter, BackgroundTasks, Form, Query, Request, Response
 from fastapi.responses import HTMLResponse, RedirectResponse
 
-from core.novelty import BEST
+from core.scores import BEST
 from service.agent import Agent
 from service.console.change import done
 from service.console.pages import Page, query, render

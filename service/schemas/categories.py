@@ -7,7 +7,7 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from core.novelty import SCORES
+from core.scores import SCORES
 from service.curation import Similarities
 from service.schemas.geometry import Vector3
 from store import records

@@ -25,7 +25,7 @@ CURVE = np.array([-1.0, 0.2, 0.3, 0.5, 0.7, 0.9])
 
 def pairs_of(similarity: np.ndarray) -> PairScores:
     """Bursts of one view each, whose mean cosines are `similarity`."""
-    return PairScores("paper_mean", np.ones(len(similarity), dtype=int), similarity, np.zeros((*similarity.shape, 0)))
+    return PairScores("mean", np.ones(len(similarity), dtype=int), similarity)
 
 
 def episode(pairs: PairScores, labels: np.ndarray, order: list[int], thresholds: np.ndarray) -> Counts:

@@ -11,8 +11,9 @@ import pytest
 
 from core.encode import EncodedBurst
 from core.errors import Conflict, NotFound, Unavailable
-from core.novelty import SCORES, DecisionConfig, decide
+from core.novelty import DecisionConfig, decide
 from core.reference import Reference
+from core.scores import SCORES
 from core.views import Burst
 from store.memory import Memory
 from store.records import Category
