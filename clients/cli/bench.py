@@ -7,9 +7,11 @@ from typing import Annotated
 
 import typer
 
+from clients.cli.terminal import SOURCE
+
 app = typer.Typer(help="Measure accuracy, discovery, speed, isolation, symmetries and robustness.", no_args_is_help=True)
 
-Data = Annotated[Path, typer.Option(help="Recorded objects: a folder in the data layout, or bop:, co3d:, transforms: or images:FOLDER.")]
+Data = Annotated[Path, typer.Option(help=f"Recorded objects: {SOURCE}.")]
 JsonFile = Annotated[Path | None, typer.Option("--json", help='File for {"meta": …, "rows": …}.')]
 Seed = Annotated[int, typer.Option(help="Of every random choice.")]
 Backbone = Annotated[str, typer.Option(help="dinov2-s14, dino-s8, or a folder of the DINO family.")]

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from clients.cli.terminal import Json, console, errors, print_json, progress_bar
+from clients.cli.terminal import SOURCE, Json, console, errors, print_json, progress_bar
 
 
 def samples(
@@ -31,7 +31,7 @@ def samples(
 
 
 def convert(
-    source: Annotated[str, typer.Argument(help="What to read: bop:, co3d:, transforms: or images:FOLDER.")],
+    source: Annotated[str, typer.Argument(help=f"What to read: {SOURCE}.")],
     out: Annotated[Path, typer.Argument(help="New folder for the recordings in the data layout.")],
     json: Json = False,
 ) -> None:

@@ -23,7 +23,8 @@ errors = Console(stderr=True)
 
 Url = Annotated[str, typer.Option(help="Address of the service.", envvar="ONELOOK_URL")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for programs.")]
-Folder = Annotated[str, typer.Argument(help="A recorded object: a folder in the data layout, or bop:, co3d:, transforms:, images:FOLDER.")]
+SOURCE = "a folder in the data layout, or FORMAT:FOLDER with a format of docs/data.md"
+Folder = Annotated[str, typer.Argument(help=f"A recorded object: {SOURCE}.")]
 URL = DEFAULT_URL
 
 

@@ -43,7 +43,7 @@ class Sight:
 
 
 @dataclass(frozen=True)
-class BopReader:
+class BopReader(folders.Reader):
     """Reads the sights of one object."""
 
     sights: tuple[Sight, ...]
@@ -163,3 +163,6 @@ def _depth_file(scene: Path, sight: Sight) -> Path:
 
 def _mask_file(scene: Path, sight: Sight) -> Path:
     return scene / "mask_visib" / f"{sight.image.stem}_{sight.index:06}.png"
+
+
+OFFERS: Mapping[str, folders.Format] = {"bop": find_sequences}

@@ -66,7 +66,7 @@ class Frame:
 
 
 @dataclass(frozen=True)
-class Co3dReader:
+class Co3dReader(folders.Reader):
     """Reads the frames of one sequence."""
 
     root: Path
@@ -183,3 +183,6 @@ def _read_jgz(path: Path) -> list[dict[str, Any]]:
             return list(json.load(stream))
     except (OSError, ValueError) as error:
         raise InvalidInput(str(path), f"is not gzipped JSON ({error}); download it again") from None
+
+
+OFFERS: Mapping[str, folders.Format] = {"co3d": find_sequences}

@@ -1,13 +1,14 @@
 """Recorded objects, and the data layout: one folder a sequence, CATEGORY/INSTANCE/{rgb,depth,mask_visib,scene_*.json,sequence.json}.
 
-Other data sets are read by the modules beside this one; `sources.find_sequences` opens any of them.
+Other data sets are read by the modules beside this one, each a `Format` that it offers by its prefix, `OFFERS: Mapping[str, Format] =
+{"prefix": find_sequences}`; `sources.find_sequences` opens any of them, and docs/data.md lists them.
 """
 
 from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from collections.abc import Sequence as Indices
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,7 +28,7 @@ SYMMETRY_SIDES = {9: 3, 16: 4}
 
 
 class Reader(Protocol):
-    """How the views of a sequence are read."""
+    """How the views of a sequence are read, and all that they depend on: an encoding that a benchmark keeps is found again by it."""
 
     def read(self, sequence: Sequence, indices: Indices[int], masks: bool) -> list[View]:
         """The views at `indices`; silhouettes where `masks` asks for them and the data have them."""
@@ -38,11 +39,11 @@ class Reader(Protocol):
         ...
 
     def cameras(self, sequence: Sequence) -> str:
-        """What decides on the cameras and is in none of these files; empty where nothing is."""
-        ...
+        """What else decides on the views, and is in none of these files."""
+        return ""
 
 
-class LayoutReader:
+class LayoutReader(Reader):
     """Reads the data layout."""
 
     def read(self, sequence: Sequence, indices: Indices[int], masks: bool) -> list[View]:
@@ -53,10 +54,6 @@ class LayoutReader:
     def files(self, sequence: Sequence) -> list[Path]:
         """See `Reader`."""
         return [*sequence.images, *sorted((sequence.path / "depth").glob("*.png")), sequence.path / "scene_camera.json"]
-
-    def cameras(self, sequence: Sequence) -> str:
-        """See `Reader`."""
-        return ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,6 +82,10 @@ class Sequence:
     def key(self) -> str:
         """Tells it from every other one: one folder may hold several, and two data sets one name."""
         return f"{self.path}:{self.name}"
+
+
+Format = Callable[[Path], list[Sequence]]
+"""Every sequence below a folder. Raises InvalidInput, saying what was expected, where there is none."""
 
 
 def find_sequences(root: Path) -> list[Sequence]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from clients.datasets import folders
@@ -12,7 +12,7 @@ from core.errors import InvalidInput
 from core.views import View
 
 
-class PhotographReader:
+class PhotographReader(folders.Reader):
     """Reads images alone."""
 
     def read(self, sequence: folders.Sequence, indices: Sequence[int], masks: bool) -> list[View]:
@@ -22,10 +22,6 @@ class PhotographReader:
     def files(self, sequence: folders.Sequence) -> list[Path]:
         """See `folders.Reader`."""
         return list(sequence.images)
-
-    def cameras(self, sequence: folders.Sequence) -> str:
-        """See `folders.Reader`."""
-        return ""
 
 
 def find_sequences(root: Path) -> list[folders.Sequence]:
@@ -39,3 +35,6 @@ def find_sequences(root: Path) -> list[folders.Sequence]:
     if not found:
         raise InvalidInput("data", f"no image in or below {root}; expected CATEGORY/INSTANCE/*.jpg")
     return found
+
+
+OFFERS: Mapping[str, folders.Format] = {"images": find_sequences}

@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
-from clients.datasets import bop, co3d, folders, photographs, transforms
+from clients.datasets import folders
 from core.errors import InvalidInput
+from core.offers import Offers
 
-FORMATS: dict[str, Callable[[Path], list[folders.Sequence]]] = {
-    "bop": bop.find_sequences,
-    "co3d": co3d.find_sequences,
-    "images": photographs.find_sequences,
-    "transforms": transforms.find_sequences,
-}
+FORMATS: Offers[folders.Format] = Offers("clients.datasets")
 
 
 def find_sequences(data: Path | str) -> list[folders.Sequence]:
-    """Every sequence of a data set, given as `co3d:FOLDER` and the like; a folder alone is in the data layout.
+    """Every sequence of a data set, given as FORMAT:FOLDER; a folder alone is in the data layout.
 
     Raises InvalidInput for an unknown format, a folder that is none, or one without sequences.
     """

@@ -32,7 +32,7 @@ MILLIMETRES = 0.001
 
 
 @dataclass(frozen=True)
-class TransformsReader:
+class TransformsReader(folders.Reader):
     """Reads the frames of one file."""
 
     file: Path
@@ -47,10 +47,6 @@ class TransformsReader:
         """See `folders.Reader`."""
         depths = [_depth_name(frame) for frame in _frames(folders.read_json(self.file), self.file)]
         return [*sequence.images, *(sequence.path / name for name in depths if name), self.file]
-
-    def cameras(self, sequence: folders.Sequence) -> str:
-        """See `folders.Reader`."""
-        return ""
 
 
 def find_sequences(root: Path) -> list[folders.Sequence]:
@@ -157,3 +153,6 @@ def _undistorted(
         None if depth_m is None else np.asarray(remapped(depth_m, cv2.INTER_NEAREST)),
         None if mask is None else np.asarray(remapped(mask.astype(np.uint8), cv2.INTER_NEAREST) > 0),
     )
+
+
+OFFERS: Mapping[str, folders.Format] = {"transforms": find_sequences}

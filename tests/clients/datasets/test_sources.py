@@ -38,6 +38,12 @@ def test_an_unknown_format_is_named_beside_those_there_are(data: str) -> None:
         find_sequences(data)
 
 
+@pytest.mark.parametrize("name", sorted(FORMATS))
+def test_every_format_is_a_row_of_the_page_on_data(name: str) -> None:
+    page = Path(__file__).parents[3] / "docs" / "data.md"
+    assert f"\n| `{name}:FOLDER` |" in page.read_text()
+
+
 def test_a_folder_that_is_none_is_named() -> None:
     with pytest.raises(InvalidInput, match="/nowhere is no folder"):
         find_sequences("bop:/nowhere")
