@@ -60,11 +60,27 @@ def test_tokens_and_attention_are_the_models_own(tmp_path: Path) -> None:
     assert np.allclose(features.attention.reshape(3, 64), attention.numpy(), atol=1e-4)
 
 
-def test_batches_do_not_change_features(tmp_path: Path) -> None:
+def test_batches_do_not_change_features(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     folder = tiny_folder("dinov2", tmp_path)
-    whole = load_backbone(str(folder), dtype=torch.float32)
-    one_by_one = DinoBackbone(Dinov2Model.from_pretrained(folder), "tiny", batch=1)
-    assert np.allclose(whole.extract(IMAGES).patches, one_by_one.extract(IMAGES).patches, atol=1e-5)
+    whole = load_backbone(str(folder), dtype=torch.float32).extract(IMAGES).patches
+    one_by_one = DinoBackbone(Dinov2Model.from_pretrained(folder), "tiny", batch=1).extract(IMAGES).patches
+    monkeypatch.setattr("core.backbones.dino.CACHED_TOKENS", 2 * 65)
+    two_and_one = load_backbone(str(folder), dtype=torch.float32).extract(IMAGES).patches
+    assert np.allclose(whole, one_by_one, atol=1e-5)
+    assert np.allclose(whole, two_and_one, atol=1e-5)
+
+
+@pytest.mark.parametrize("kind", ["dino", "dinov2", "registers"])
+def test_attention_as_products_is_transformers_own(kind: str, tmp_path: Path) -> None:
+    backbone = load_backbone(str(tiny_folder(kind, tmp_path)), dtype=torch.bfloat16)
+    for name, values in backbone._model.named_parameters():
+        if "q_proj.weight" in name or "query.weight" in name:
+            values.mul_(100)  # random attention is nearly uniform, which hides any scale
+    products = backbone.extract(IMAGES)
+    backbone._model.set_attn_implementation("eager")
+    eager = backbone.extract(IMAGES)
+    assert np.allclose(products.patches, eager.patches, atol=0.02)
+    assert np.allclose(products.cls, eager.cls, atol=0.02)
 
 
 @pytest.mark.parametrize("kind", ["dino", "dinov2", "registers"])
