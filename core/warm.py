@@ -34,6 +34,8 @@ class WarmConfig:
     """Refinement turns a pose by less than this towards the right one; a larger turn is another pose, not the same one moved on."""
     most_resize: float = 1.3
     """Factor by which it may change the scale, for the same reason."""
+    sought_anew_after: int = 15
+    """Frames for which an object is followed from its last pose: a pose that was wrong from the start must not stay."""
     dims: int = 32
     dense: DenseConfig = field(default_factory=lambda: DenseConfig(points=300))
 

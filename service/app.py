@@ -17,6 +17,7 @@ from core.backbones.base import Backbone
 from core.backbones.dino import load_backbone
 from core.encode import EncoderConfig
 from core.errors import OneLookError
+from core.warm import WarmConfig
 from service import errors
 from service.agent import Agent, AgentConfig
 from service.auth import Guard
@@ -42,10 +43,18 @@ PRUNE_EVERY_S = 3600
 log = logging.getLogger("onelook")
 
 
-def create_app(settings: Settings, *, backbone: Backbone | None = None, compute: Compute | None = None, asks: bool = True) -> FastAPI:
+def create_app(
+    settings: Settings,
+    *,
+    backbone: Backbone | None = None,
+    compute: Compute | None = None,
+    asks: bool = True,
+    warm: WarmConfig = WarmConfig(),
+) -> FastAPI:
     """The service with these settings; it opens its memory and loads its backbone (unless one is given) when it starts.
 
     `compute` is given where others have the backbone. `asks` is False where nobody but this process reaches it: then it asks for no key.
+    `warm` is how objects are followed.
     """
 
     metrics = Metrics()
@@ -77,6 +86,7 @@ def create_app(settings: Settings, *, backbone: Backbone | None = None, compute:
     app.state.settings = settings
     app.state.metrics = metrics
     app.state.tracks = 0
+    app.state.warm = warm
     app.state.demo = Demo()
     app.add_middleware(BodyLimits, max_mb=settings.max_upload_mb, bodies=settings.workers + settings.queue, deadline_s=settings.deadline_s)
     app.add_middleware(OwnPagesOnly)

@@ -19,9 +19,6 @@ from core.views import Burst, View
 from core.warm import Settled, WarmConfig, follow, settle
 from service.agent import Agent
 
-SOUGHT_ANEW_AFTER = 15
-"""Frames for which an object is followed from its last pose: a pose that was wrong from the start must not stay."""
-
 
 @dataclass(frozen=True)
 class TrackOptions:
@@ -34,7 +31,6 @@ class TrackOptions:
     variant: str = "ucd"
     seed: int = 0
     track: TrackConfig = field(default_factory=TrackConfig)
-    warm: WarmConfig = field(default_factory=WarmConfig)
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,12 +70,13 @@ class Update:
 class Tracker:
     """One object. Frames come in the order they were taken, one at a time."""
 
-    def __init__(self, agent: Agent, options: TrackOptions) -> None:
+    def __init__(self, agent: Agent, options: TrackOptions, warm: WarmConfig) -> None:
         """Raises NotFound for an unknown category, InvalidInput for an unknown variant or a window without views."""
         if options.window < 1:
             raise InvalidInput("window", f"expected at least 1 view, found {options.window}")
         self._agent = agent
         self._options = options
+        self._warm = warm
         self._estimator = PoseEstimator(PoseConfig.named(options.variant))
         self._views: deque[tuple[EncodedView, float]] = deque(maxlen=options.window)
         self._track = Track()
@@ -154,10 +151,10 @@ class Tracker:
         whole = len(self._views) == self._options.window  # until then each view may tell a better pose
         if self._settled is None or self._track.pose is None or self._track.jumped is not None or not whole:
             return []
-        if self._followed >= SOUGHT_ANEW_AFTER:
+        if self._followed >= self._warm.sought_anew_after:
             return []
         before = replace(self._settled, pose=self._track.pose)
-        settled = follow(reference, self._burst, before, self._options.warm, self._options.seed)
+        settled = follow(reference, self._burst, before, self._warm, self._options.seed)
         self._settled, self._followed = settled, self._followed + 1
         return [settled.pose] if settled else []
 
@@ -168,7 +165,7 @@ class Tracker:
         estimate = self._estimator.estimate(reference, self._burst, seed=self._options.seed)
         poses = [estimate.target_from_reference, *(each.target_from_reference for each in estimate.alternatives)]
         asked = [pose for pose in (self._track.pose, poses[0]) if pose is not None]
-        settled = [settle(reference, self._burst, pose, self._options.warm, self._options.seed) for pose in asked]
+        settled = [settle(reference, self._burst, pose, self._warm, self._options.seed) for pose in asked]
         self._settled = max((each for each in settled if each), key=lambda each: each.score, default=None)
         if self._settled is not None and self._settled.pose is not poses[0]:
             poses.insert(0, self._settled.pose)

@@ -33,15 +33,14 @@ def _serve(memory: Path, grid: int, warm: bool, port: int) -> None:
     import uvicorn
 
     from core.encode import Encoder, EncoderConfig
-    from service import tracker
+    from core.warm import WarmConfig
     from service.app import create_app, warm_backbone
     from service.batching import BatchingBackbone
     from service.compute import Compute
     from service.settings import Settings
 
-    if not warm:
-        tracker.SOUGHT_ANEW_AFTER = 0
     settings = Settings(host=HOST, port=port, data_dir=memory)
     backbone = BatchingBackbone(warm_backbone(settings))
     compute = Compute(backbone, Encoder(backbone, EncoderConfig(grid=grid)))
-    uvicorn.run(create_app(settings, compute=compute), host=HOST, port=port, log_level="warning")
+    app = create_app(settings, compute=compute, warm=WarmConfig() if warm else WarmConfig(sought_anew_after=0))
+    uvicorn.run(app, host=HOST, port=port, log_level="warning")

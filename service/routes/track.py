@@ -13,6 +13,7 @@ from pydantic import BaseModel, ValidationError
 from starlette.websockets import WebSocketState
 
 from core.errors import OneLookError, Unavailable
+from core.warm import WarmConfig
 from service.agent import Agent
 from service.auth import admit_socket
 from service.errors import problem_of, validation_problem
@@ -78,7 +79,7 @@ async def track(socket: WebSocket) -> None:
         return
     state.tracks += 1
     try:
-        tracker = await _greet(socket, state.agent)
+        tracker = await _greet(socket, state.agent, state.warm)
         if tracker is not None:
             await _follow(socket, tracker, state.agent, state.work)
     except WebSocketDisconnect:
@@ -87,11 +88,11 @@ async def track(socket: WebSocket) -> None:
         state.tracks -= 1
 
 
-async def _greet(socket: WebSocket, agent: Agent) -> Tracker | None:
+async def _greet(socket: WebSocket, agent: Agent, warm: WarmConfig) -> Tracker | None:
     """The tracker that `hello` asks for; None where it is refused."""
     try:
         hello = Hello.model_validate_json(await _text(socket))
-        tracker = await run_sync(lambda: Tracker(agent, hello.options()))
+        tracker = await run_sync(lambda: Tracker(agent, hello.options(), warm))
     except (ValidationError, OneLookError) as error:
         await _refuse(socket, error, status.WS_1008_POLICY_VIOLATION)
         return None

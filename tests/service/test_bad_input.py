@@ -13,17 +13,7 @@ import numpy as np
 import pytest
 
 from core.views import Burst
-
-
-def refused(answer, status, field, *words):
-    """Asserts a problem about `field` whose detail has all `words`."""
-    problem = answer.json()
-    assert (answer.status_code, problem["status"]) == (status, status), answer.text
-    assert answer.headers["content-type"] == "application/problem+json"
-    assert set(problem) <= {"type", "title", "status", "detail", "field", "errors"}
-    assert problem.get("field") == field, problem
-    for word in words:
-        assert word in problem["detail"], problem["detail"]
+from tests.service.problems import refused
 
 
 def huge_png(width=10_000, height=10_000):

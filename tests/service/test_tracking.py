@@ -17,6 +17,7 @@ from starlette.websockets import WebSocketDisconnect
 
 from core.scan import hemisphere
 from core.sim3 import Sim3, rotation_angle_deg
+from core.warm import WarmConfig
 from service import tracker
 from service.app import create_app
 from service.routes.track import WAITING_FRAMES, Waiting
@@ -24,6 +25,7 @@ from service.routes.track import WAITING_FRAMES, Waiting
 UP = np.array([0.0, 0.0, 1.0])
 PLACED = Sim3(1.0, Rotation.from_euler("z", 50, degrees=True).as_matrix(), np.array([0.3, -0.1, 0.05]))
 MOVED = Sim3(1.0, PLACED.rotation, np.array([0.8, 0.4, 0.05]))
+SOUGHT_EACH_FRAME = WarmConfig(sought_anew_after=0)
 
 
 def png(image):
@@ -262,13 +264,13 @@ def test_an_object_that_jumped_is_sought_anew(track, category, camera_round, sol
     assert np.linalg.norm(np.array(answers[-1]["pose"]["world_from_object"])[:2, 3] - MOVED.translation[:2]) < 0.03
 
 
-def test_what_is_followed_for_long_is_sought_anew(track, category, camera_round, solves, monkeypatch):
-    monkeypatch.setattr(tracker, "SOUGHT_ANEW_AFTER", 0)
+def test_what_is_followed_for_long_is_sought_anew(client, track, category, camera_round, solves):
+    client.app.state.warm = SOUGHT_EACH_FRAME
     track([message(*each) for each in enumerate(camera_round(PLACED, 5))], category_id=category["id"], window=2)
     assert len(solves) == 5
 
 
-def test_a_solve_that_lays_the_object_on_worse_than_the_last_pose_is_not_believed(track, category, camera_round, monkeypatch):
+def test_a_solve_that_lays_the_object_on_worse_than_the_last_pose_is_not_believed(client, track, category, camera_round, monkeypatch):
     estimate = tracker.PoseEstimator.estimate
     count = [0]
 
@@ -279,7 +281,7 @@ def test_a_solve_that_lays_the_object_on_worse_than_the_last_pose_is_not_believe
         return found if count[0] < 3 else replace(found, target_from_reference=found.target_from_reference @ upside_down)
 
     monkeypatch.setattr(tracker.PoseEstimator, "estimate", misled)
-    monkeypatch.setattr(tracker, "SOUGHT_ANEW_AFTER", 0)
+    client.app.state.warm = SOUGHT_EACH_FRAME
     answers = track([message(*each) for each in enumerate(camera_round(PLACED, 9))], category_id=category["id"], window=3)
     assert count == [9]
     last = answers[-1]["pose"]["target_from_reference"]

@@ -9,9 +9,8 @@ from __future__ import annotations
 import json
 import zipfile
 from collections import Counter
-from collections.abc import Callable
 from copy import deepcopy
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,41 +18,23 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, Phase, seed, settings
 from hypothesis import strategies as st
-from hypothesis.stateful import RuleBasedStateMachine, precondition, rule, run_state_machine_as_test
+from hypothesis.stateful import precondition, rule, run_state_machine_as_test
 
 from core.encode import EncodedBurst
 from core.reference import Reference
 from core.scan import ScanRequest
 from core.sim3 import Sim3
 from core.views import Burst
-from store.columns import files_from_json
-from store.folders import sums
 from store.memory import Memory
 from store.observations import Answer, Joins
 from store.requests import Reply
-from store.retention import Retention
-from store.sweep import FOLDERS
-from tests.faults import Crash, Disk, tapped
+from tests.store.crash_model import Material
+from tests.store.crashing import KEPT, Crashing
 
 LEAST_CRASHES = 200
 EXAMPLES, STEPS = 20, 30
 MOST_ROUNDS = 8
 """Of so many examples: where crashes fall is left to chance, and short steps are seldom hit."""
-KEPT = 4
-"""Observations, so that the oldest are dropped all the time."""
-CALLS = {
-    "import": 58,
-    "observe": 31,
-    "split": 29,
-    "learn": 29,
-    "add views": 27,
-    "open": 20,
-    "prune": 12,
-    "begin a scan": 9,
-    "delete a scan": 4,
-}
-"""That a step takes; others take FEW."""
-FEW = 3
 MOST_CATEGORIES = 5
 DONE = Reply(201, "application/json", b"{}")
 
@@ -61,156 +42,8 @@ crashes = st.tuples(st.integers(0, 3), st.integers(0, 999), st.booleans(), st.in
 """No crash where the first is 0; where in the step; whether it is a power cut; a crash of the restart too where the last is 0."""
 
 
-@dataclass
-class Known:
-    """What the memory should hold, by labels that the steps give: ids are random."""
-
-    categories: dict[str, dict[str, list[Any]]] = field(default_factory=dict)
-    scans: dict[int, tuple[str, int]] = field(default_factory=dict)
-    observations: list[str] = field(default_factory=list)
-    setting: int | None = None
-
-
-def found(memory: Memory) -> Known:
-    """The same, of a memory."""
-    names = {category.id: category.name for category in memory.categories.all()}
-    known = Known(setting=memory.setting("rate"))
-    for category_id, name in names.items():
-        assert name not in known.categories
-        known.categories[name] = {"instances": [], "goals": sorted(goal.name for goal in memory.goals.of(category_id))}
-    for member in memory.instances.members():
-        known.categories[names[member.category_id]]["instances"].append(int(member.pooled[0, 0]))
-    for about in known.categories.values():
-        about["instances"].sort()
-    for row in memory._connection.rows("SELECT id FROM scans"):
-        scan = memory.scans.get(row["id"])
-        known.scans[int(scan.request.radius_m)] = (scan.state, scan.views)
-    known.observations = [seen.frame for seen in reversed(memory.observations.latest(100))]
-    return known
-
-
-def require_whole(memory: Memory) -> None:
-    """Every file is what was written, every row has its folder and every folder its row."""
-    report = memory.check()
-    assert report.ok, report.damages
-    for category in memory.categories.all():
-        assert len(memory.categories.reference(category.id).views) == category.views == len(memory.categories.burst(category.id))
-        assert category.instances == len(memory.instances.of(category.id)) > 0
-    named = {memory.folder / row["folder"]: row["files"] for query in FOLDERS.values() for row in memory._connection.rows(query)}
-    roots = (memory.categories.root, memory.observations.root, *(memory.folder / "scans").glob("*"))
-    there = {folder for kind in roots for folder in kind.glob("*")}
-    assert there == set(named), there ^ set(named)
-    assert all(sums(folder) == files_from_json(files) for folder, files in named.items())
-
-
-@dataclass(frozen=True, eq=False)
-class Material:
-    """What is learnt."""
-
-    reference: Reference
-    burst: Burst
-    encoded: EncodedBurst
-    archive: Path
-
-    def tokens(self, label: int) -> EncodedBurst:
-        """Tokens that tell their label."""
-        views = tuple(replace(view, pooled=np.full_like(view.pooled, label)) for view in self.encoded.views)
-        return EncodedBurst(views, self.encoded.fingerprint)
-
-
-class Crashing(RuleBasedStateMachine):
-    """Steps on one memory."""
-
-    material: Material
-    parent: Path
-    crashed: Counter[str]
-    runs = 0
-
-    def __init__(self) -> None:
-        super().__init__()
-        type(self).runs += 1
-        self.label = 0
-        self.folders = 0
-        self.known = Known()
-        self.before_change: dict[str, Any] | None = None
-        """Categories as they were before the last change, where that can be undone."""
-        self.disk = Disk(self.next_folder())
-        self.tap = tapped(self.disk)
-        self.tap.__enter__()
-        self.memory = self.opened()
-        self.memory.import_archive(self.material.archive)
-        self.known.categories = {name: {"instances": [0], "goals": []} for name in ("imported-1", "imported-2")}
-
-    def teardown(self) -> None:
-        self.tap.__exit__(None, None, None)
-        self.memory.close()
-
-    def next_folder(self) -> Path:
-        self.folders += 1
-        return self.parent / f"{self.runs}-{self.folders}"
-
-    def next_label(self) -> int:
-        self.label += 1
-        return self.label
-
-    def opened(self) -> Memory:
-        return Memory.open(self.disk.root, Retention(observations=KEPT))
-
-    def step(
-        self,
-        name: str,
-        change: Callable[[], object],
-        after: Known,
-        crash: tuple[int, int, bool, int],
-        *,
-        undoable: bool | None = False,
-        again: Callable[[], object] | None = None,
-    ) -> None:
-        """One change, and perhaps a crash in it; `again` is what the caller does who got no answer. `undoable` None leaves it."""
-        here, where, power_cut, restart = crash
-        before = deepcopy(self.known)
-        self.disk.arm(1 + where * CALLS.get(name, FEW) // 1000 if here else None)
-        try:
-            change()
-        except Crash:
-            self.crashed[name] += 1
-            self.restart(power_cut, None if restart else 1 + where % CALLS["open"])
-            now = found(self.memory)
-            assert now in (before, after), f"{name}, after {self.disk.kinds}"
-            require_whole(self.memory)
-            done = now == after
-            if again is not None:
-                again()
-                done = True
-        else:
-            done = True
-        if done:
-            self.known = after
-            if undoable is not None:
-                self.before_change = before.categories if undoable else None
-        self.disk.arm(None)
-        assert found(self.memory) == self.known
-
-    def restart(self, power_cut: bool, crash_at: int | None) -> None:
-        """What a dead process left, opened by another one, which may die of it too."""
-        dead = self.memory
-        self.disk.move(self.disk.left(self.next_folder(), power_cut=power_cut))
-        dead.close()
-        self.disk.arm(crash_at)
-        try:
-            self.memory = self.opened()
-        except Crash:
-            self.crashed["open"] += 1
-            self.disk.move(self.disk.left(self.next_folder(), power_cut=power_cut))
-            self.memory = self.opened()
-        self.disk.arm(None)
-
-    def category_id(self, name: str) -> str:
-        return next(category.id for category in self.memory.categories.all() if category.name == name)
-
-    def scan_id(self, label: int) -> str:
-        rows = self.memory._connection.rows("SELECT id FROM scans")
-        return next(row["id"] for row in rows if int(self.memory.scans.get(row["id"]).request.radius_m) == label)
+class Steps(Crashing):
+    """What is done to a memory."""
 
     def pick(self, which: int, among: list[Any]) -> Any:
         return among[which % len(among)]
@@ -359,10 +192,6 @@ class Crashing(RuleBasedStateMachine):
         after = replace(deepcopy(self.known), setting=self.next_label())
         self.step("calibrate", lambda: self.memory.keep_setting("rate", after.setting), after, crash, undoable=None)
 
-    def instance_label(self, instance_id: str) -> int:
-        (row,) = self.memory._connection.rows("SELECT pooled FROM instances WHERE id = ?", instance_id)
-        return int(np.frombuffer(row["pooled"], "<f4")[0])
-
 
 @pytest.fixture
 def material(tmp_path: Path, reference: Reference, burst: Burst, encoded: EncodedBurst) -> Material:
@@ -376,7 +205,7 @@ def material(tmp_path: Path, reference: Reference, burst: Burst, encoded: Encode
 
 
 def test_two_hundred_crashes_lose_nothing_that_was_acknowledged(material: Material, tmp_path: Path) -> None:
-    class Here(Crashing):
+    class Here(Steps):
         parent = tmp_path
 
     Here.material, Here.crashed = material, Counter()
