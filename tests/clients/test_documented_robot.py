@@ -1,22 +1,28 @@
-"""The examples of README.md and docs/robot.md do what the pages say."""
+"""The examples of docs/robot.md, and the commands of docs/quickstart.md, do what the pages say."""
 
 from __future__ import annotations
 
 import asyncio
+import json
 import re
+import shlex
+import shutil
+import subprocess
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from typer.testing import CliRunner
 
 from clients.cameras.simulated import recorded
+from clients.cli import app
 from clients.datasets.folders import Sequence, load_burst
 from clients.robot import RobotClient
 
 ROOT = Path(__file__).parents[2]
 LOOP, ASYNCHRONOUS, STREAMS, ARM = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "robot.md").read_text(), re.DOTALL)
-(README,) = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.DOTALL)
+QUICK_START = "".join(re.findall(r"```sh\n(.*?)```", (ROOT / "docs" / "quickstart.md").read_text(), re.DOTALL))
 ADDRESS = "http://127.0.0.1:8000"
 
 
@@ -28,10 +34,20 @@ def run(example: str, url: str) -> dict[str, Any]:
     return names
 
 
-def test_the_readmes_robot_learns_a_category(url: str, robot: RobotClient, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_quick_starts_commands_teach_a_category(url: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(ROOT)
-    assert len(run(README, url)["scan"]) == 10
-    assert [(each.name, each.views) for each in robot.categories()] == [("cup", 10)]
+    monkeypatch.setenv("ONELOOK_URL", url)
+    typed = [CliRunner().invoke(app, shlex.split(line)) for line in re.findall(r"^onelook (.*)", QUICK_START, re.MULTILINE)]
+    assert [each.exit_code for each in typed] == [0, 0, 0]
+    assert "learnt cup" in typed[0].output
+    assert "cup" in typed[2].output
+
+
+@pytest.mark.skipif(shutil.which("curl") is None, reason="needs curl")
+def test_the_quick_starts_curl_sends_a_burst(url: str) -> None:
+    typed = QUICK_START[QUICK_START.index("CUP=") :].replace(ADDRESS, url)
+    ran = subprocess.run(["bash", "-euc", typed], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert json.loads(ran.stdout)["outcome"] == "novel"
 
 
 def test_the_loop_learns_a_category_and_knows_it_then(
@@ -39,7 +55,7 @@ def test_the_loop_learns_a_category_and_knows_it_then(
 ) -> None:
     monkeypatch.chdir(ROOT)
     assert run(LOOP, url)["category"].name == "cup"
-    assert [each.name for each in robot.categories()] == ["cup"]
+    assert [(each.name, each.views) for each in robot.categories()] == [("cup", 10)]
     robot.observe(load_burst(run(LOOP, url)["cup"], range(4)), category_id=robot.categories()[0].id)  # the same burst joins
     capsys.readouterr()
     assert run(LOOP, url)["seen"].outcome == "known"

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import re
+from dataclasses import fields
 from pathlib import Path
 
 import pytest
+import yaml
 
 from clients.simulator.raycast.world import RaycastSubject
 from clients.simulator.script import Script, read_script, script_from
@@ -29,6 +32,15 @@ def test_a_script_says_what_is_met_in_which_order(tmp_path: Path) -> None:
     assert subjects[0].sensor is not None
     assert subjects[0].sensor.speckle == 0.2
     assert script.as_settings()["categories"] == ("mug", "present")
+
+
+def test_the_documented_script_is_one(tmp_path: Path) -> None:
+    page = (Path(__file__).parents[2] / "docs" / "simulator.md").read_text()
+    (block,) = re.findall(r"```yaml\n(.*?)```", page, re.DOTALL)
+    file = tmp_path / "episode.yaml"
+    file.write_text("\n".join(line for line in block.splitlines() if "FOLDER" not in line))
+    assert read_script(file).length == 40
+    assert set(yaml.safe_load(block)) == {field.name for field in fields(Script)}
 
 
 def test_robots_of_one_script_meet_other_objects() -> None:

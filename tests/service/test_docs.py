@@ -1,7 +1,8 @@
-"""Every curl of docs/http.md works, one after the other, against a live service."""
+"""Every curl of docs/http.md works, one after the other, against a live service, and so does its Python."""
 
 from __future__ import annotations
 
+import asyncio
 import re
 import shutil
 import subprocess
@@ -10,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import cv2
+import httpx
 import numpy as np
 import pytest
 
@@ -18,6 +20,7 @@ from service.settings import Settings
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "http.md"
+NPZ, FOLLOW = re.findall(r"^```python\n(.*?)^```", PAGE.read_text(), re.MULTILINE | re.DOTALL)
 SCRIPT = "\n".join(re.findall(r"^```sh\n(.*?)^```", PAGE.read_text(), re.MULTILINE | re.DOTALL))
 
 
@@ -47,3 +50,30 @@ def test_every_curl_of_the_page_works(url: str, tmp_path: Path) -> None:
     assert ran.returncode == 0, f"{ran.stdout[-500:]}\n{ran.stderr[-2000:]}"
     for picture in tmp_path.glob("*.png"):
         assert cv2.imread(str(picture)) is not None, picture.name
+
+
+def test_an_npz_file_as_the_page_makes_it_is_a_burst(url: str, look: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    views = look(views=2).views
+    arrays = {
+        "rgb": np.stack([view.rgb for view in views]),
+        "depth_m": np.stack([view.depth_m for view in views]),
+        "K": np.stack([view.camera.K for view in views]),
+        "world_from_camera": np.stack([view.camera.world_from_camera for view in views]),
+    }
+    exec(compile(NPZ, PAGE.name, "exec"), {"numpy": np, **arrays})
+    body = (tmp_path / "burst.npz").read_bytes()
+    answer = httpx.post(f"{url}/v1/observations", content=body, headers={"Content-Type": "application/x-npz"})
+    assert (answer.status_code, answer.json()["outcome"]) == (201, "novel")
+
+
+def test_the_pages_client_follows_frames(url: str, look: Any, capsys: pytest.CaptureFixture[str]) -> None:
+    def frame(view: Any) -> Any:
+        depth_mm = np.round(1000 * view.depth_m).astype(np.uint16)
+        images = (cv2.imencode(".jpg", view.rgb[..., ::-1])[1].tobytes(), cv2.imencode(".png", depth_mm)[1].tobytes())
+        return (*images, view.camera.K.tolist(), view.camera.world_from_camera.tolist())
+
+    names: dict[str, Any] = {}
+    exec(compile(FOLLOW.replace("ws://127.0.0.1:8000", url.replace("http", "ws")), PAGE.name, "exec"), names)
+    asyncio.run(names["follow"]([frame(view) for view in look(views=2).views], None))
+    assert capsys.readouterr().out == "ready\nNone None\nNone None\n"  # the memory is empty
