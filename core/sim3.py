@@ -118,7 +118,5 @@ def umeyama(source: FloatArray, target: FloatArray, weights: FloatArray | None =
         raise NoPose("the correspondences lie on one line or point, so their rotation is not determined")
     signs = np.array([1.0, 1.0, np.sign(np.linalg.det(u @ vt))])
     rotation = (u * signs) @ vt
-    scale = float((singular * signs).sum() / variance)
-    if scale <= 0:
-        raise NoPose("the correspondences are a reflection of each other; no similarity fits them")
+    scale = float((singular * signs).sum() / variance)  # positive: singular values fall, and the first is above 0
     return Sim3(scale, rotation, target_mean - scale * rotation @ source_mean)

@@ -10,12 +10,15 @@ from scipy.spatial.transform import Rotation
 
 from core.crop import Window
 from core.encode import EncodedBurst, EncodedView
+from core.reference import Reference, build_reference
 from core.scan import hemisphere
 from core.sim3 import Sim3
 from core.views import Camera
 
 GRID = 28
 IMAGE = 224
+IN_PLACE = Sim3.identity()
+DISTANCE_M = 1.0
 K = np.array([[400.0, 0, 111.5], [0, 400.0, 111.5], [0, 0, 1]])
 
 
@@ -28,9 +31,13 @@ class PaintedObject:
         frequencies = rng.normal(size=(3, dim)) * 12
         self.descriptors = np.sin(self.points @ frequencies + rng.uniform(0, 6.28, dim)).astype(np.float32)
 
-    def encode(self, views: int, world_from_object: Sim3, *, distance_m: float = 1.0) -> EncodedBurst:
+    def reference(self, views: int) -> Reference:
+        """Of so many views, in its own frame."""
+        return build_reference(self.encode(views))
+
+    def encode(self, views: int, world_from_object: Sim3 = IN_PLACE) -> EncodedBurst:
         """Views from a hemisphere about the object placed in a world; the cameras are those of a robot in that world."""
-        poses = hemisphere(np.zeros(3), np.array([0.0, 0, 1]), distance_m, views)
+        poses = hemisphere(np.zeros(3), np.array([0.0, 0, 1]), DISTANCE_M, views)
         poses[:, :3, 3] = world_from_object.apply(poses[:, :3, 3])
         poses[:, :3, :3] = world_from_object.rotation @ poses[:, :3, :3]
         return EncodedBurst(tuple(self._view(Camera(K, pose), world_from_object) for pose in poses), "painted")
@@ -75,3 +82,17 @@ def before_the_object(view: EncodedView, share: float) -> EncodedView:
     points = view.points_m.copy()
     points[:hidden] += 0.3 * (view.camera.world_from_camera[:3, 3] - points[:hidden])
     return replace(view, points_m=points)
+
+
+def blind(burst: EncodedBurst) -> EncodedBurst:
+    """The same burst without any depth."""
+    return replace(burst, views=tuple(replace(view, points_m=np.full_like(view.points_m, np.nan)) for view in burst.views))
+
+
+def first_patches(burst: EncodedBurst, count: int) -> EncodedBurst:
+    """The same burst, of whose views only so many patches are kept."""
+    kept = (
+        replace(view, cells=view.cells[:count], descriptors=view.descriptors[:count], points_m=view.points_m[:count])
+        for view in burst.views
+    )
+    return replace(burst, views=tuple(kept))

@@ -13,7 +13,7 @@ from core.reference import build_reference
 from core.scan import request_scan
 from core.sim3 import Sim3
 
-from .conftest import PaintedObject, before_the_object
+from .conftest import PaintedObject, before_the_object, blind
 
 
 def of_a_table(view: EncodedView) -> EncodedView:
@@ -29,17 +29,15 @@ def with_table(encoded: EncodedBurst, index: int) -> EncodedBurst:
 
 
 def test_of_a_view_of_the_table_what_lies_within_the_object_is_left_at_most(painted: PaintedObject) -> None:
-    encoded = with_table(painted.encode(8, Sim3.identity()), 2)
+    encoded = with_table(painted.encode(8), 2)
     kept = agreeing(encoded)
     assert len(kept.views[2].cells) < 0.2 * len(encoded.views[2].cells)
     assert all(left is before for index, (left, before) in enumerate(zip(kept.views, encoded.views)) if index != 2)
-    np.testing.assert_allclose(
-        build_reference(kept).box.extent_m, build_reference(painted.encode(8, Sim3.identity())).box.extent_m, rtol=0.1
-    )
+    np.testing.assert_allclose(build_reference(kept).box.extent_m, painted.reference(8).box.extent_m, rtol=0.1)
 
 
 def test_of_a_view_that_shows_a_wall_too_the_object_stays(painted: PaintedObject) -> None:
-    encoded = painted.encode(8, Sim3.identity())
+    encoded = painted.encode(8)
     view = encoded.views[3]
     walled = view.points_m.copy()
     walled[: len(walled) // 4] += (0.0, 3.0, 0.0)
@@ -55,18 +53,17 @@ def test_all_sides_of_an_object_stay(painted: PaintedObject, moved: Sim3) -> Non
 
 
 def test_of_two_views_that_differ_both_stay(painted: PaintedObject) -> None:
-    encoded = with_table(painted.encode(2, Sim3.identity()), 0)
+    encoded = with_table(painted.encode(2), 0)
     assert agreeing(encoded) is encoded
 
 
 def test_views_without_depth_say_nothing(painted: PaintedObject) -> None:
-    encoded = painted.encode(6, Sim3.identity())
-    blind = replace(encoded, views=tuple(replace(view, points_m=np.full_like(view.points_m, np.nan)) for view in encoded.views))
-    assert agreeing(blind) is blind
+    photographed = blind(painted.encode(6))
+    assert agreeing(photographed) is photographed
 
 
 def test_a_scan_is_asked_for_about_the_object_though_some_patches_are_of_the_wall(painted: PaintedObject) -> None:
-    encoded = painted.encode(8, Sim3.identity())
+    encoded = painted.encode(8)
     first = encoded.views[0]
     strays = first.points_m.copy()
     strays[: len(strays) // 3] += (0.0, 0.0, 4.0)
@@ -75,7 +72,7 @@ def test_a_scan_is_asked_for_about_the_object_though_some_patches_are_of_the_wal
 
 
 def test_what_is_before_the_object_in_one_view_goes(painted: PaintedObject) -> None:
-    encoded = painted.encode(8, Sim3.identity())
+    encoded = painted.encode(8)
     view = encoded.views[3]
     found = replace(encoded, views=(*encoded.views[:3], before_the_object(view, 0.6), *encoded.views[4:]))
     kept = agreeing(found).views
@@ -84,7 +81,7 @@ def test_what_is_before_the_object_in_one_view_goes(painted: PaintedObject) -> N
 
 
 def test_patches_without_depth_are_not_judged(painted: PaintedObject) -> None:
-    encoded = painted.encode(8, Sim3.identity())
+    encoded = painted.encode(8)
     points = encoded.views[3].points_m.copy()
     points[::2] = np.nan
     views = (*encoded.views[:3], replace(encoded.views[3], points_m=points), *encoded.views[4:])
@@ -92,7 +89,7 @@ def test_patches_without_depth_are_not_judged(painted: PaintedObject) -> None:
 
 
 def test_cameras_that_are_all_wrong_take_nothing_out(painted: PaintedObject) -> None:
-    encoded = painted.encode(6, Sim3.identity())
+    encoded = painted.encode(6)
 
     def moved(view: EncodedView, index: int) -> EncodedView:
         assert view.camera is not None

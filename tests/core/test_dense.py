@@ -17,7 +17,6 @@ from core.estimators.batched import Sim3Batch, umeyama_batch
 from core.hypotheses import distinct
 from core.normals import outward_normals
 from core.pose import VARIANTS, PoseEstimator
-from core.reference import build_reference
 from core.sim3 import Sim3, rotation_angle_deg
 from core.surface import Surface
 
@@ -34,7 +33,7 @@ def turned(degrees: float) -> Sim3:
 
 @pytest.fixture
 def agreement(painted: PaintedObject, moved: Sim3) -> DenseAgreement:
-    sides = [painted.encode(5, Sim3.identity()).views, painted.encode(4, moved).views]
+    sides = [painted.encode(5).views, painted.encode(4, moved).views]
     described = [[unit(view.descriptors) for view in views] for views in sides]
     return DenseAgreement(Surface(sides[0]), Surface(sides[1]), (described[0], described[1]), DenseConfig(), seed=0)
 
@@ -77,7 +76,7 @@ def test_a_batch_of_fits_is_each_fit_alone(moved: Sim3) -> None:
 def test_an_object_that_looks_the_same_from_behind_has_a_rival(painted: PaintedObject, moved: Sim3) -> None:
     painted.points = np.concatenate([painted.points, turned(180).apply(painted.points)])
     painted.descriptors = np.concatenate([painted.descriptors, painted.descriptors])
-    estimate = PoseEstimator(VARIANTS["best"]).estimate(build_reference(painted.encode(6, Sim3.identity())), painted.encode(4, moved))
+    estimate = PoseEstimator(VARIANTS["best"]).estimate(painted.reference(6), painted.encode(4, moved))
     rival = estimate.alternatives[0]
     assert estimate.score is not None
     assert estimate.score * 0.8 < rival.score <= estimate.score
@@ -85,9 +84,9 @@ def test_an_object_that_looks_the_same_from_behind_has_a_rival(painted: PaintedO
 
 
 def test_best_without_a_match_is_no_pose(painted: PaintedObject) -> None:
-    target = painted.encode(2, Sim3.identity())
+    target = painted.encode(2)
     opposite = EncodedBurst(tuple(replace(view, descriptors=np.zeros_like(view.descriptors)) for view in target.views), target.fingerprint)
-    reference = build_reference(painted.encode(4, Sim3.identity()))
+    reference = painted.reference(4)
     zero_mean = replace(reference.basis, mean=np.zeros_like(reference.basis.mean))
     with pytest.raises(NoPose, match="no view pair"):
         PoseEstimator(VARIANTS["best"]).estimate(replace(reference, basis=zero_mean), opposite)

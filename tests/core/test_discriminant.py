@@ -26,7 +26,7 @@ def changing(views: tuple[EncodedView, ...], direction: np.ndarray, seed: int = 
 
 def test_what_changes_with_the_view_is_left_out(painted: PaintedObject) -> None:
     direction = np.eye(48, dtype=np.float32)[7]
-    views = changing(painted.encode(8, Sim3.identity()).views, direction)
+    views = changing(painted.encode(8).views, direction)
     principal = PcaBasis.fit(np.concatenate([view.descriptors for view in views])).components
     directions = discriminant_directions([views], 32)
     assert abs(principal[0] @ direction) > 0.99
@@ -37,7 +37,7 @@ def test_what_changes_with_the_view_is_left_out(painted: PaintedObject) -> None:
 
 def test_what_the_target_changes_in_is_left_out_too(painted: PaintedObject, moved: Sim3) -> None:
     direction = np.eye(48, dtype=np.float32)[7]
-    reference = list(painted.encode(8, Sim3.identity()).views)
+    reference = list(painted.encode(8).views)
     target = changing(painted.encode(8, moved).views, direction)
     alone, together = (np.linalg.norm(discriminant_directions(each, 32), axis=1)[7] for each in ([reference], [reference, target]))
     assert together < 0.2 * alone
@@ -45,11 +45,11 @@ def test_what_the_target_changes_in_is_left_out_too(painted: PaintedObject, move
 
 @pytest.mark.parametrize("views", [1, 2])
 def test_few_or_no_points_seen_twice_still_give_directions(painted: PaintedObject, views: int) -> None:
-    directions = discriminant_directions([painted.encode(views, Sim3.identity()).views, []], 32)
+    directions = discriminant_directions([painted.encode(views).views, []], 32)
     assert directions.shape == (48, 32)
     assert np.isfinite(directions).all()
 
 
 def test_tokens_that_are_all_alike_give_finite_directions(painted: PaintedObject) -> None:
-    views = [replace(view, descriptors=np.ones_like(view.descriptors)) for view in painted.encode(3, Sim3.identity()).views]
+    views = [replace(view, descriptors=np.ones_like(view.descriptors)) for view in painted.encode(3).views]
     assert np.isfinite(discriminant_directions([views], 8)).all()

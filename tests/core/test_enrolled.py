@@ -14,7 +14,6 @@ from core.enrolled import ADAPTED_FROM, EXACT, NEAREST, Enrolled, adapted_from
 from core.errors import InvalidInput
 from core.nearness import Listed, Nearness
 from core.novelty import Context, DecisionConfig, Member, decide
-from core.sim3 import Sim3
 
 from .conftest import PaintedObject
 
@@ -68,7 +67,7 @@ def one_each(kinds: int) -> Kept:
 
 @pytest.fixture
 def seen(painted: PaintedObject) -> Callable[[int, int], EncodedBurst]:
-    view = painted.encode(1, Sim3.identity()).views[0]
+    view = painted.encode(1).views[0]
     cells = np.zeros((PATCHES, 2), np.int16)
 
     def burst(kind: int, seed: int) -> EncodedBurst:

@@ -8,7 +8,6 @@ import torch
 
 from core.descriptors import unit
 from core.evidence import ADAPTATION_PRIOR, COHORT, Adaptation, Comparison, Entry, cohort_level, match_views, sample_patches
-from core.sim3 import Sim3
 
 from .conftest import PaintedObject
 
@@ -76,7 +75,7 @@ def test_a_category_left_out_is_as_if_it_were_not_there() -> None:
 
 
 def test_patches_are_drawn_the_same_way_every_time_from_views_that_show_something(painted: PaintedObject) -> None:
-    burst = painted.encode(3, Sim3.identity())
+    burst = painted.encode(3)
     first, again = sample_patches(burst), sample_patches(burst)
     assert first.shape == (3, 24, 48)
     np.testing.assert_array_equal(first, again)

@@ -10,7 +10,6 @@ import pytest
 from core.agreement import agreeing
 from core.encode import EncodedBurst
 from core.grounds import Grounds, grounds
-from core.sim3 import Sim3
 from core.views import Burst, View
 
 from .conftest import IMAGE, PaintedObject, before_the_object
@@ -25,7 +24,7 @@ def grounds_of(encoded: EncodedBurst) -> Grounds:
 
 
 def test_views_from_all_sides_are_no_weak_grounds(painted: PaintedObject) -> None:
-    found = grounds_of(painted.encode(6, Sim3.identity()))
+    found = grounds_of(painted.encode(6))
     assert (found.views, found.shown, found.with_depth) == (6, 6, 6)
     assert found.spread_deg is not None
     assert found.spread_deg > 60
@@ -33,19 +32,19 @@ def test_views_from_all_sides_are_no_weak_grounds(painted: PaintedObject) -> Non
 
 
 def test_one_view_says_how_little_it_is(painted: PaintedObject) -> None:
-    found = grounds_of(painted.encode(6, Sim3.identity()).select([2]))
+    found = grounds_of(painted.encode(6).select([2]))
     assert found.spread_deg == pytest.approx(0, abs=1e-4)
     assert "one view" in str(found.weakness)
 
 
 def test_views_from_one_side_say_so(painted: PaintedObject) -> None:
-    view = painted.encode(6, Sim3.identity()).views[2]
+    view = painted.encode(6).views[2]
     found = grounds_of(EncodedBurst((view, view), "painted"))
     assert "within 0°" in str(found.weakness)
 
 
 def test_what_the_other_views_do_not_see_is_told_of(painted: PaintedObject) -> None:
-    encoded = painted.encode(6, Sim3.identity())
+    encoded = painted.encode(6)
     views = list(encoded.views)
     views[2] = before_the_object(views[2], 0.7)
     found = grounds_of(replace(encoded, views=tuple(views)))

@@ -10,7 +10,6 @@ import pytest
 from core.encode import EncodedBurst
 from core.errors import InvalidInput
 from core.next_view import LOOKED_DEG, Candidate, next_viewpoints
-from core.reference import build_reference
 from core.scan import angles_about_deg
 from core.sim3 import Sim3
 
@@ -36,9 +35,7 @@ def seen(painted: PaintedObject, moved: Sim3) -> EncodedBurst:
 
 
 def test_the_differing_side_is_looked_at(painted: PaintedObject, moved: Sim3, seen: EncodedBurst) -> None:
-    candidates = [
-        Candidate(build_reference(each.encode(SCAN_VIEWS, Sim3.identity())), moved) for each in (painted, with_another_side(painted))
-    ]
+    candidates = [Candidate(each.reference(SCAN_VIEWS), moved) for each in (painted, with_another_side(painted))]
     poses = next_viewpoints(seen, candidates, None)
     assert 1 <= len(poses) <= 3
     first = moved.inverse().apply(poses[0][:3, 3])
@@ -46,7 +43,7 @@ def test_the_differing_side_is_looked_at(painted: PaintedObject, moved: Sim3, se
 
 
 def test_viewpoints_are_apart_from_each_other_and_from_what_was_seen(painted: PaintedObject, moved: Sim3, seen: EncodedBurst) -> None:
-    poses = next_viewpoints(seen, [Candidate(build_reference(painted.encode(6, Sim3.identity())), moved)], None)
+    poses = next_viewpoints(seen, [Candidate(painted.reference(6), moved)], None)
     center = np.median(seen.cloud_m, axis=0)
     between = angles_about_deg(poses, poses, center)[~np.eye(len(poses), dtype=bool)]
     assert (between > LOOKED_DEG).all()

@@ -12,13 +12,12 @@ from core.errors import InvalidInput
 from core.evidence import PATCHES
 from core.novelty import Context, Decision, DecisionConfig, Member, decide
 from core.scores import SCORES
-from core.sim3 import Sim3
 
 from .conftest import PaintedObject
 
 
 def burst_of(painted: PaintedObject, tokens: np.ndarray) -> EncodedBurst:
-    view = painted.encode(1, Sim3.identity()).views[0]
+    view = painted.encode(1).views[0]
     return EncodedBurst(tuple(replace(view, cls=token, pooled=token) for token in tokens.astype(np.float32)), "painted")
 
 
@@ -61,7 +60,7 @@ def member(kind: int, seed: int) -> Member:
 
 
 def seen(painted: PaintedObject, kind: int, seed: int, views: int = 4) -> EncodedBurst:
-    view = painted.encode(1, Sim3.identity()).views[0]
+    view = painted.encode(1).views[0]
     cells = np.zeros((PATCHES, 2), np.int16)
     made = [
         replace(view, cells=cells, descriptors=each.astype(np.float32), pooled=each.mean(axis=0), cls=each.mean(axis=0))

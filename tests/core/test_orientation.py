@@ -7,20 +7,15 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from core.encode import EncodedBurst
 from core.errors import InvalidInput, NoPose
 from core.orientation import Appearance, Orientation, OrientationConfig, estimate_orientation
 from core.sim3 import Sim3, rotation_angle_deg
 
-from .conftest import PaintedObject
-
-
-def blind(burst: EncodedBurst) -> EncodedBurst:
-    return EncodedBurst(tuple(replace(view, points_m=np.full_like(view.points_m, np.nan)) for view in burst.views), burst.fingerprint)
+from .conftest import PaintedObject, blind, first_patches
 
 
 def test_rotation_and_direction_follow_without_depth(painted: PaintedObject, moved: Sim3) -> None:
-    scanned, target = blind(painted.encode(12, Sim3.identity())), blind(painted.encode(6, moved))
+    scanned, target = blind(painted.encode(12)), blind(painted.encode(6, moved))
     found = estimate_orientation(Appearance.of(scanned), target)
     assert rotation_angle_deg(found.rotation, moved.rotation) < 10
     reference_view, target_view = found.pairs[0]
@@ -35,7 +30,7 @@ def test_there_is_no_scale_to_be_read() -> None:
 
 
 def test_depth_is_never_looked_at(painted: PaintedObject, moved: Sim3) -> None:
-    scanned, target = painted.encode(6, Sim3.identity()), painted.encode(4, moved)
+    scanned, target = painted.encode(6), painted.encode(4, moved)
     seeing = estimate_orientation(Appearance.of(scanned), target)
     not_seeing = estimate_orientation(Appearance.of(blind(scanned)), blind(target))
     assert np.array_equal(seeing.rotation, not_seeing.rotation)
@@ -43,22 +38,15 @@ def test_depth_is_never_looked_at(painted: PaintedObject, moved: Sim3) -> None:
 
 
 def test_the_seed_decides_everything(painted: PaintedObject, moved: Sim3) -> None:
-    appearance, target = Appearance.of(painted.encode(6, Sim3.identity())), painted.encode(3, moved)
+    appearance, target = Appearance.of(painted.encode(6)), painted.encode(3, moved)
     first, again = (estimate_orientation(appearance, target, seed=3) for _ in range(2))
     assert np.array_equal(first.rotation, again.rotation)
 
 
 def test_too_few_correspondences_are_no_pose(painted: PaintedObject) -> None:
-    target = painted.encode(3, Sim3.identity())
-    views = tuple(
-        replace(view, cells=view.cells[:3], descriptors=view.descriptors[:3], points_m=view.points_m[:3]) for view in target.views
-    )
+    few = first_patches(painted.encode(3), 3)
     with pytest.raises(NoPose, match="essential"):
-        estimate_orientation(
-            Appearance.of(painted.encode(4, Sim3.identity())),
-            EncodedBurst(views, target.fingerprint),
-            OrientationConfig(correspondences=3),
-        )
+        estimate_orientation(Appearance.of(painted.encode(4)), few, OrientationConfig(correspondences=3))
 
 
 def test_distance_in_metres_is_refused_as_a_way_to_match() -> None:
@@ -68,6 +56,4 @@ def test_distance_in_metres_is_refused_as_a_way_to_match() -> None:
 
 def test_tokens_of_another_backbone_are_refused(painted: PaintedObject) -> None:
     with pytest.raises(InvalidInput, match="backbone"):
-        estimate_orientation(
-            Appearance.of(painted.encode(3, Sim3.identity())), replace(painted.encode(2, Sim3.identity()), fingerprint="other")
-        )
+        estimate_orientation(Appearance.of(painted.encode(3)), replace(painted.encode(2), fingerprint="other"))

@@ -7,21 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.encode import EncodedBurst, EncodedView
+from core.encode import EncodedBurst
 from core.errors import InvalidInput, NoPose
 from core.pose import PoseConfig, PoseEstimator, PoseOptions
-from core.reference import build_reference
 from core.sim3 import Sim3, rotation_angle_deg
 
-from .conftest import PaintedObject
-
-
-def blind(burst: EncodedBurst) -> EncodedBurst:
-    return EncodedBurst(tuple(replace(view, points_m=np.full_like(view.points_m, np.nan)) for view in burst.views), burst.fingerprint)
-
-
-def first_patches(view: EncodedView, count: int) -> EncodedView:
-    return replace(view, cells=view.cells[:count], descriptors=view.descriptors[:count], points_m=view.points_m[:count])
+from .conftest import PaintedObject, blind, first_patches
 
 
 @pytest.fixture
@@ -30,7 +21,7 @@ def estimator() -> PoseEstimator:
 
 
 def test_rotation_place_and_size_follow_from_views_without_depth(painted: PaintedObject, moved: Sim3, estimator: PoseEstimator) -> None:
-    reference, target = build_reference(painted.encode(8, Sim3.identity())), blind(painted.encode(5, moved))
+    reference, target = painted.reference(8), blind(painted.encode(5, moved))
     estimate = estimator.estimate(reference, target)
     found = estimate.target_from_reference
     assert rotation_angle_deg(found.rotation, moved.rotation) < 2
@@ -50,43 +41,40 @@ def test_it_survives_correspondences_of_which_a_third_are_wrong(painted: Painted
         wrong = rng.random(len(descriptors)) < 1 / 3
         descriptors[wrong] = rng.permutation(descriptors[wrong])
         views.append(replace(view, descriptors=descriptors))
-    reference = build_reference(painted.encode(8, Sim3.identity()))
+    reference = painted.reference(8)
     found = estimator.estimate(reference, EncodedBurst(tuple(views), target.fingerprint)).target_from_reference
     assert rotation_angle_deg(found.rotation, moved.rotation) < 4
     assert abs(np.log(found.scale / moved.scale)) < 0.06
 
 
 def test_the_seed_decides_everything(painted: PaintedObject, moved: Sim3, estimator: PoseEstimator) -> None:
-    reference, target = build_reference(painted.encode(6, Sim3.identity())), blind(painted.encode(3, moved))
+    reference, target = painted.reference(6), blind(painted.encode(3, moved))
     first, again = (estimator.estimate(reference, target, seed=4).target_from_reference.as_matrix() for _ in range(2))
     assert np.array_equal(first, again)
 
 
 def test_one_view_does_not_tell_size(painted: PaintedObject, moved: Sim3, estimator: PoseEstimator) -> None:
     with pytest.raises(NoPose, match="different sides"):
-        estimator.estimate(build_reference(painted.encode(6, Sim3.identity())), blind(painted.encode(1, moved)))
+        estimator.estimate(painted.reference(6), blind(painted.encode(1, moved)))
 
 
 def test_two_views_from_one_place_do_not_tell_size(painted: PaintedObject, moved: Sim3, estimator: PoseEstimator) -> None:
     view = blind(painted.encode(1, moved)).views[0]
     with pytest.raises(NoPose, match="different sides"):
-        estimator.estimate(build_reference(painted.encode(6, Sim3.identity())), EncodedBurst((view, view), "painted"))
+        estimator.estimate(painted.reference(6), EncodedBurst((view, view), "painted"))
 
 
 def test_nothing_in_common_is_no_pose(painted: PaintedObject, estimator: PoseEstimator) -> None:
-    target = blind(painted.encode(3, Sim3.identity()))
-    views = tuple(
-        replace(view, cells=view.cells[:2], descriptors=view.descriptors[:2], points_m=view.points_m[:2]) for view in target.views
-    )
+    few = first_patches(blind(painted.encode(3)), 2)
     with pytest.raises(NoPose, match="patches of the target agree|several target views"):
-        estimator.estimate(build_reference(painted.encode(4, Sim3.identity())), EncodedBurst(views, target.fingerprint))
+        estimator.estimate(painted.reference(4), few)
 
 
 def test_cameras_are_needed(painted: PaintedObject, estimator: PoseEstimator) -> None:
-    target = blind(painted.encode(2, Sim3.identity()))
+    target = blind(painted.encode(2))
     views = (target.views[0], replace(target.views[1], camera=None))
     with pytest.raises(InvalidInput, match=r"views\[1\].K"):
-        estimator.estimate(build_reference(painted.encode(4, Sim3.identity())), EncodedBurst(views, target.fingerprint))
+        estimator.estimate(painted.reference(4), EncodedBurst(views, target.fingerprint))
 
 
 def test_nine_degrees_of_freedom_are_refused() -> None:

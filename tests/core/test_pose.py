@@ -12,10 +12,10 @@ from core.encode import EncodedBurst
 from core.errors import InvalidInput, TooFewViews
 from core.estimators import ESTIMATORS
 from core.pose import VARIANTS, PoseConfig, PoseEstimator, PoseOptions
-from core.reference import Reference, build_reference
+from core.reference import Reference
 from core.sim3 import Sim3, rotation_angle_deg
 
-from .conftest import PaintedObject
+from .conftest import PaintedObject, blind
 
 
 def assert_recovered(found: Sim3, applied: Sim3) -> None:
@@ -26,14 +26,14 @@ def assert_recovered(found: Sim3, applied: Sim3) -> None:
 
 @pytest.mark.parametrize("variant", sorted(set(VARIANTS) - {"r", "rc"}))
 def test_a_similarity_applied_by_hand_is_recovered(variant: str, painted: PaintedObject, moved: Sim3) -> None:
-    reference = build_reference(painted.encode(6, Sim3.identity()))
+    reference = painted.reference(6)
     estimate = PoseEstimator(PoseConfig.named(variant)).estimate(reference, painted.encode(5, moved))
     assert_recovered(estimate.target_from_reference, moved)
 
 
 @pytest.mark.parametrize("variant", ["r", "rc"])
 def test_retrieval_is_right_to_the_spacing_of_views(variant: str, painted: PaintedObject, moved: Sim3) -> None:
-    reference = build_reference(painted.encode(12, Sim3.identity()))
+    reference = painted.reference(12)
     found = PoseEstimator(PoseConfig.named(variant)).estimate(reference, painted.encode(8, moved)).target_from_reference
     assert rotation_angle_deg(found.rotation, moved.rotation) < 20
     assert abs(np.log(found.scale / moved.scale)) < 0.1
@@ -41,7 +41,7 @@ def test_retrieval_is_right_to_the_spacing_of_views(variant: str, painted: Paint
 
 @pytest.mark.parametrize("method", METHODS)
 def test_every_way_to_match(method: str, painted: PaintedObject, moved: Sim3) -> None:
-    reference = build_reference(painted.encode(6, Sim3.identity()))
+    reference = painted.reference(6)
     estimate = PoseEstimator(PoseConfig(method=method)).estimate(reference, painted.encode(5, moved))
     assert_recovered(estimate.target_from_reference, moved)
 
@@ -51,12 +51,12 @@ def test_every_way_to_match(method: str, painted: PaintedObject, moved: Sim3) ->
 def test_every_descriptor_size_and_estimator(dims: int, estimator: str, painted: PaintedObject, moved: Sim3) -> None:
     config = PoseConfig.named("ucd", PoseOptions(dims=dims, estimator=estimator, consensus_deg=15, inlier_ratio=0.05))
     assert (config.dims, config.estimator, config.consensus_deg, config.inlier_ratio) == (dims, estimator, 15, 0.05)
-    estimate = PoseEstimator(config).estimate(build_reference(painted.encode(6, Sim3.identity())), painted.encode(5, moved))
+    estimate = PoseEstimator(config).estimate(painted.reference(6), painted.encode(5, moved))
     assert_recovered(estimate.target_from_reference, moved)
 
 
 def test_whole_tokens_by_their_size_or_by_none_are_the_same(painted: PaintedObject, moved: Sim3) -> None:
-    reference, target = build_reference(painted.encode(4, Sim3.identity())), painted.encode(3, moved)
+    reference, target = painted.reference(4), painted.encode(3, moved)
     by_size, by_none = (PoseEstimator(PoseConfig(dims=dims)).estimate(reference, target) for dims in (48, None))
     assert np.array_equal(by_size.target_from_reference.as_matrix(), by_none.target_from_reference.as_matrix())
 
@@ -84,12 +84,12 @@ def test_an_option_without_effect_or_sense_is_refused_by_its_name(variant: str, 
 
 def test_more_components_than_are_kept_are_refused(painted: PaintedObject) -> None:
     with pytest.raises(InvalidInput, match="48 for whole tokens, found 65"):
-        PoseEstimator(PoseConfig(dims=65)).estimate(build_reference(painted.encode(3, Sim3.identity())), painted.encode(2, Sim3.identity()))
+        PoseEstimator(PoseConfig(dims=65)).estimate(painted.reference(3), painted.encode(2))
 
 
 @pytest.mark.parametrize(("variant", "tolerance"), [("ucd", 0.04), ("best", 0.08)])
 def test_nine_degrees_recover_a_scale_for_each_axis(variant: str, tolerance: float, painted: PaintedObject, moved: Sim3) -> None:
-    reference = build_reference(painted.encode(8, Sim3.identity()))
+    reference = painted.reference(8)
     stretched = PaintedObject()
     axes = reference.box.world_from_object[:3, :3]
     scales = np.array([1.25, 0.85, 1.0])
@@ -107,34 +107,34 @@ def test_points_that_do_not_determine_nine_degrees_keep_seven_and_say_why(moved:
     flat = PaintedObject()
     flat.points[:, 2] = 0
     estimator = PoseEstimator(PoseConfig.named("ucd", PoseOptions(dof=9)))
-    estimate = estimator.estimate(build_reference(flat.encode(8, Sim3.identity())), flat.encode(6, moved))
+    estimate = estimator.estimate(flat.reference(8), flat.encode(6, moved))
     assert_recovered(estimate.target_from_reference, moved)
     assert estimate.target_from_object is None
     assert "plane" in str(estimate.not_9d_because)
-    box = build_reference(flat.encode(8, Sim3.identity())).box
+    box = flat.reference(8).box
     assert np.allclose(estimate.matrix(box), estimate.target_from_reference.as_matrix())
 
 
 def test_zsp_uses_one_view_of_each(painted: PaintedObject, moved: Sim3) -> None:
-    reference, target = build_reference(painted.encode(5, Sim3.identity())), painted.encode(4, moved)
+    reference, target = painted.reference(5), painted.encode(4, moved)
     estimate = PoseEstimator(PoseConfig.named("zsp")).estimate(reference, target)
     assert estimate.pairs == ((0, int(estimate.view_similarity[0].argmax())),)
     assert set(estimate.matches.reference_view) == {0}
 
 
 def test_the_seed_decides_everything(painted: PaintedObject, moved: Sim3) -> None:
-    reference, target = build_reference(painted.encode(4, Sim3.identity())), painted.encode(3, moved)
+    reference, target = painted.reference(4), painted.encode(3, moved)
     first, second = (PoseEstimator().estimate(reference, target, seed=3) for _ in range(2))
     assert np.array_equal(first.target_from_reference.as_matrix(), second.target_from_reference.as_matrix())
 
 
 def test_matches_point_at_patches_that_have_depth(painted: PaintedObject, moved: Sim3) -> None:
     target = painted.encode(3, moved)
-    blind = replace(
+    half_blind = replace(
         target.views[0], points_m=np.where(np.arange(len(target.views[0].cells))[:, None] % 2, np.nan, target.views[0].points_m)
     )
-    target = EncodedBurst((blind, *target.views[1:]), target.fingerprint)
-    matches = PoseEstimator().estimate(build_reference(painted.encode(6, Sim3.identity())), target).matches
+    target = EncodedBurst((half_blind, *target.views[1:]), target.fingerprint)
+    matches = PoseEstimator().estimate(painted.reference(6), target).matches
     assert len(matches) > 20
     assert all(target.views[view].trusted[patch] for view, patch in zip(matches.target_view, matches.target_patch))
     moved_points = np.stack([target.views[view].points_m[patch] for view, patch in zip(matches.target_view, matches.target_patch)])
@@ -142,26 +142,24 @@ def test_matches_point_at_patches_that_have_depth(painted: PaintedObject, moved:
 
 
 def test_a_single_target_view_is_enough(painted: PaintedObject, moved: Sim3) -> None:
-    reference = build_reference(painted.encode(8, Sim3.identity()))
+    reference = painted.reference(8)
     assert_recovered(PoseEstimator().estimate(reference, painted.encode(1, moved)).target_from_reference, moved)
 
 
 def test_a_reference_needs_two_views(painted: PaintedObject) -> None:
     with pytest.raises(TooFewViews, match="at least 2 views"):
-        build_reference(painted.encode(1, Sim3.identity()))
+        painted.reference(1)
 
 
 def test_a_target_without_depth_is_refused(painted: PaintedObject) -> None:
-    target = painted.encode(2, Sim3.identity())
-    blind = EncodedBurst(tuple(replace(view, points_m=np.full_like(view.points_m, np.nan)) for view in target.views), target.fingerprint)
     with pytest.raises(InvalidInput, match="depth"):
-        PoseEstimator().estimate(build_reference(painted.encode(4, Sim3.identity())), blind)
+        PoseEstimator().estimate(painted.reference(4), blind(painted.encode(2)))
 
 
 def test_tokens_of_another_backbone_are_refused(painted: PaintedObject) -> None:
-    target = replace(painted.encode(2, Sim3.identity()), fingerprint="other")
+    target = replace(painted.encode(2), fingerprint="other")
     with pytest.raises(InvalidInput, match="backbone"):
-        PoseEstimator().estimate(build_reference(painted.encode(4, Sim3.identity())), target)
+        PoseEstimator().estimate(painted.reference(4), target)
 
 
 def test_an_unknown_variant_is_named() -> None:
@@ -170,7 +168,7 @@ def test_an_unknown_variant_is_named() -> None:
 
 
 def test_a_reference_survives_its_arrays(painted: PaintedObject, moved: Sim3) -> None:
-    reference = build_reference(painted.encode(4, Sim3.identity()))
+    reference = painted.reference(4)
     again = Reference.from_arrays(reference.as_arrays())
     target = painted.encode(3, moved)
     first, second = (PoseEstimator().estimate(each, target).target_from_reference for each in (reference, again))

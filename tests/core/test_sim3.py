@@ -73,20 +73,64 @@ def test_mirrored_points_give_a_rotation_not_a_reflection() -> None:
     assert np.isclose(np.linalg.det(fit.rotation), 1)
 
 
-@pytest.mark.parametrize("source", [np.outer(np.arange(5.0), [1, 2, 3]), np.ones((5, 3)), POINTS[:2]], ids=["line", "point", "two"])
+LINE = np.outer(np.arange(5.0), [1, 2, 3])
+
+
+@pytest.mark.parametrize("source", [LINE, LINE + 1e-8 * POINTS[:5], np.ones((5, 3))], ids=["line", "nearly a line", "point"])
 def test_undetermined_points_are_refused(source: np.ndarray) -> None:
-    with pytest.raises(NoPose):
+    with pytest.raises(NoPose, match="^the correspondences lie on one line or point, so their rotation is not determined$"):
         umeyama(source, source)
 
 
-def test_negative_scale_is_refused() -> None:
-    with pytest.raises(InvalidInput, match="positive"):
-        Sim3(-1.0, np.eye(3), np.zeros(3))
+def test_two_points_are_too_few() -> None:
+    with pytest.raises(NoPose, match="^a similarity needs three correspondences, found 2$"):
+        umeyama(POINTS[:2], POINTS[:2])
+
+
+def test_three_points_are_enough(moved: Sim3) -> None:
+    assert same(umeyama(POINTS[:3], moved.apply(POINTS[:3])), moved)
+
+
+@pytest.mark.parametrize("size_m", [1e-4, 1e4])
+def test_an_object_of_any_size_is_fitted(size_m: float, moved: Sim3) -> None:
+    fit = umeyama(size_m * POINTS, moved.apply(size_m * POINTS))
+    assert np.allclose(fit.rotation, moved.rotation, atol=1e-8)
+    assert np.isclose(fit.scale, moved.scale)
+
+
+@pytest.mark.parametrize("scale", [-1.0, 0.0, np.inf, np.nan])
+def test_a_scale_that_is_not_positive_is_refused(scale: float) -> None:
+    with pytest.raises(InvalidInput, match=f"^scale: expected a positive number, found {scale}$"):
+        Sim3(scale, np.eye(3), np.zeros(3))
+
+
+@pytest.mark.parametrize(("linear", "found"), [(np.diag([1.0, 1, -1]), "-1"), (np.diag([1.0, 1, 0]), "0")])
+def test_a_matrix_that_mirrors_or_flattens_is_refused(linear: np.ndarray, found: str) -> None:
+    matrix = np.eye(4)
+    matrix[:3, :3] = linear
+    with pytest.raises(InvalidInput, match=f"^matrix: determinant is {found}; a similarity has a positive one$"):
+        Sim3.from_matrix(matrix)
+
+
+def test_a_matrix_that_stretches_is_refused() -> None:
+    with pytest.raises(InvalidInput, match="^matrix: its 3×3 block is not a rotation times one scale$"):
+        Sim3.from_matrix(np.diag([1.01, 1, 1, 1]))
+
+
+def test_a_matrix_of_a_file_s_precision_is_taken() -> None:
+    turned = np.round(Rotation.from_euler("xyz", [10, 20, 30], degrees=True).as_matrix(), 4)
+    assert Sim3.from_matrix(np.block([[turned, np.zeros((3, 1))], [np.eye(4)[3]]])).scale == pytest.approx(1, abs=1e-4)
 
 
 def test_angle_between_rotations() -> None:
-    turned = Rotation.from_euler("z", 40, degrees=True).as_matrix()
-    assert np.isclose(rotation_angle_deg(np.eye(3), turned), 40)
+    turned = Rotation.from_euler("z", [[40], [170]], degrees=True).as_matrix()
+    assert np.allclose(rotation_angle_deg(np.eye(3), turned), [40, 170])
+
+
+@pytest.mark.parametrize("angle_deg", [0, 180])
+def test_rounding_leaves_an_angle_a_number(angle_deg: int) -> None:
+    rounded = (1 + 1e-9) * Rotation.from_euler("z", angle_deg, degrees=True).as_matrix()
+    assert rotation_angle_deg(np.eye(3), rounded) == angle_deg
 
 
 @given(similarities())

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from core.encode import EncodedBurst
 from core.errors import InvalidInput
-from core.reference import Reference, build_reference
+from core.reference import Reference
 from core.sim3 import Sim3, rotation_angle_deg
 from core.warm import Settled, WarmConfig, follow, nearest_views, settle
 
@@ -19,7 +19,7 @@ CONFIG = WarmConfig()
 
 @pytest.fixture
 def reference(painted: PaintedObject) -> Reference:
-    return build_reference(painted.encode(8, Sim3.identity()))
+    return painted.reference(8)
 
 
 def turned(pose: Sim3, angle_deg: float, shift_m: float) -> Sim3:

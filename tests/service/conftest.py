@@ -60,6 +60,12 @@ def parts() -> Callable[..., list[tuple[str, tuple[str, bytes, str]]]]:
     return pack
 
 
+def colour_only(about: dict[str, Any], files: dict[str, list[bytes]]) -> None:
+    """An edit of `parts` that leaves photographs: neither cameras nor depth."""
+    del about["views"]
+    files["depth"].clear()
+
+
 def png(image: np.ndarray) -> bytes:
     """An image as a file."""
     return cv2.imencode(".png", image)[1].tobytes()
@@ -109,6 +115,12 @@ def learn(client: TestClient, look: Any, parts: Any) -> Callable[..., dict[str, 
         return answer.json()
 
     return category
+
+
+@pytest.fixture
+def ball(learn: Callable[..., dict[str, Any]]) -> dict[str, Any]:
+    """A category."""
+    return learn("bright", "ball")
 
 
 @pytest.fixture

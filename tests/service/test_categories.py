@@ -6,6 +6,8 @@ import cv2
 import numpy as np
 import pytest
 
+from tests.service.conftest import colour_only
+
 
 def picture(answer):
     """The image of an answer, shape (H, W, 3), BGR."""
@@ -195,10 +197,6 @@ def test_what_cannot_be_split(client, look, parts, learn):
     assert (whole.status_code, whole.json()["field"]) == (422, "instance_ids")
     unknown = client.post(path, json={"instance_ids": ["nope"]})
     assert (unknown.status_code, unknown.json()["field"]) == (422, "instance_ids[0]")
-
-    def colour_only(about, files):
-        del about["views"]
-        files["depth"].clear()
 
     client.post("/v1/observations", files=parts(look(), colour_only), params={"category_id": category["id"]})
     photographs = client.get(f"/v1/categories/{category['id']}/instances").json()["instances"][1]

@@ -6,12 +6,6 @@ import pytest
 
 
 @pytest.fixture
-def ball(learn):
-    """A category."""
-    return learn("bright", "ball")
-
-
-@pytest.fixture
 def seen(client, ball, look, parts):
     """An observation of it, whose burst joined it."""
     answer = client.post("/v1/observations", files=parts(look())).json()

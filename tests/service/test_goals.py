@@ -7,22 +7,17 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from core.sim3 import Sim3, rotation_angle_deg
+from tests.service.conftest import colour_only
 
 GOAL = Sim3(1.0, Rotation.from_euler("z", 40, degrees=True).as_matrix(), np.array([0.5, 0.1, 0.05]))
 SMALLER = Sim3(0.7, Rotation.from_euler("z", -20, degrees=True).as_matrix(), np.array([-0.2, 0.3, 0.035]))
 
 
 @pytest.fixture
-def category(learn):
-    """A category whose objects are ellipsoids."""
-    return learn("bright", "ball")
-
-
-@pytest.fixture
-def goal(client, category, look, parts):
+def goal(client, ball, look, parts):
     """Where its objects shall end."""
     burst = parts(look(world_from_object=GOAL), lambda about, files: about.update(frame="table"))
-    answer = client.post(f"/v1/categories/{category['id']}/goals", files=burst, params={"name": "on the shelf"})
+    answer = client.post(f"/v1/categories/{ball['id']}/goals", files=burst, params={"name": "on the shelf"})
     assert answer.status_code == 201, answer.text
     return answer.json()
 
@@ -31,16 +26,16 @@ def motion_of(plan):
     return np.array(plan["goal_from_current"]["matrix"])
 
 
-def test_a_goal_is_kept_with_the_pose_of_what_was_shown(client, category, goal):
-    assert (goal["category_id"], goal["name"], goal["anchor"], goal["frame"]) == (category["id"], "on the shelf", "center", "table")
+def test_a_goal_is_kept_with_the_pose_of_what_was_shown(client, ball, goal):
+    assert (goal["category_id"], goal["name"], goal["anchor"], goal["frame"]) == (ball["id"], "on the shelf", "center", "table")
     shown = Sim3.from_matrix(np.array(goal["target_from_reference"]["matrix"]))
     assert rotation_angle_deg(shown.rotation, GOAL.rotation) < 3
     assert client.get(f"/v1/goals/{goal['id']}").json() == goal
-    assert client.get(f"/v1/categories/{category['id']}/goals").json() == {"goals": [goal]}
+    assert client.get(f"/v1/categories/{ball['id']}/goals").json() == {"goals": [goal]}
 
 
-def test_showing_a_goal_teaches_nothing(client, category, goal):
-    assert client.get(f"/v1/categories/{category['id']}").json()["instances"] == 1
+def test_showing_a_goal_teaches_nothing(client, ball, goal):
+    assert client.get(f"/v1/categories/{ball['id']}").json()["instances"] == 1
 
 
 def test_the_plan_takes_an_object_s_centre_and_axes_to_the_goal(client, goal, look, parts):
@@ -63,12 +58,12 @@ def test_by_the_base_a_smaller_object_stands_on_the_same_support(client, goal, l
     assert np.allclose(centre, GOAL.translation - [0, 0, 0.05 * 0.3], atol=0.015)
 
 
-def test_a_goal_and_a_plan_from_earlier_observations(client, category, look, parts):
-    options = {"category_id": category["id"], "learn": False}
+def test_a_goal_and_a_plan_from_earlier_observations(client, ball, look, parts):
+    options = {"category_id": ball["id"], "learn": False}
     placed, seen = (
         client.post("/v1/observations", files=parts(look(world_from_object=each)), params=options).json() for each in (GOAL, SMALLER)
     )
-    goal = client.post(f"/v1/categories/{category['id']}/goals", json={"observation_id": placed["id"]}).json()
+    goal = client.post(f"/v1/categories/{ball['id']}/goals", json={"observation_id": placed["id"]}).json()
     assert goal["target_from_reference"] == placed["pose"]["target_from_reference"]
     plan = client.post(f"/v1/goals/{goal['id']}/plan", json={"observation_id": seen["id"]}).json()
     assert plan["observation_id"] == seen["id"]
@@ -94,10 +89,6 @@ def test_views_from_one_direction_do_not_tell_the_base(client, goal, look, parts
 
 
 def test_an_object_without_a_pose_has_no_plan(client, goal, look, parts):
-    def colour_only(about, files):
-        del about["views"]
-        files["depth"].clear()
-
     answer = client.post(f"/v1/goals/{goal['id']}/plan", files=parts(look(), colour_only))
     assert (answer.status_code, answer.json()["type"]) == (422, "urn:onelook:problem:no-pose")
 

@@ -6,6 +6,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from core.sim3 import Sim3, rotation_angle_deg
+from tests.service.conftest import colour_only
 
 PLACED = Sim3(1.3, Rotation.from_rotvec([0.2, -0.3, 0.9]).as_matrix(), np.array([0.4, -0.2, 0.1]))
 
@@ -72,10 +73,6 @@ def test_one_view_is_enough_for_a_target(client, look, parts, learn):
 def test_photographs_without_depth_and_cameras_are_recognised_without_a_pose(client, look, parts, learn):
     learn()
 
-    def colour_only(about, files):
-        del about["views"]
-        files["depth"].clear()
-
     seen = client.post("/v1/observations", files=parts(look("bright"), colour_only)).json()
     assert (seen["outcome"], seen["pose"]) == ("known", None)
     assert "K" in seen["pose_error"]
@@ -91,10 +88,6 @@ def test_cameras_without_depth_are_enough_for_a_pose(client, look, parts, learn)
 
 
 def test_a_novel_photograph_has_no_scan_and_says_why(client, look, parts):
-    def colour_only(about, files):
-        del about["views"]
-        files["depth"].clear()
-
     seen = client.post("/v1/observations", files=parts(look("bright"), colour_only)).json()
     assert (seen["outcome"], seen["scan"]) == ("novel", None)
     assert "world_from_camera" in seen["scan_error"]

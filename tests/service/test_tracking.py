@@ -57,11 +57,6 @@ def camera_round(look):
 
 
 @pytest.fixture
-def category(learn):
-    return learn("bright", "ball")
-
-
-@pytest.fixture
 def track(client):
     """track(messages, hello): what is answered to messages sent one by one, each when the one before was answered."""
 
@@ -84,9 +79,9 @@ def kinds(answers):
     return [answer["type"] for answer in answers]
 
 
-def test_every_frame_gets_a_pose_that_is_near_the_truth(track, category, camera_round):
-    answers = track([message(*each) for each in enumerate(camera_round(PLACED))], category_id=category["id"])
-    assert answers[0] == {"type": "ready", "category_id": category["id"], "window": 5, "weight": 0.5}
+def test_every_frame_gets_a_pose_that_is_near_the_truth(track, ball, camera_round):
+    answers = track([message(*each) for each in enumerate(camera_round(PLACED))], category_id=ball["id"])
+    assert answers[0] == {"type": "ready", "category_id": ball["id"], "window": 5, "weight": 0.5}
     assert kinds(answers[1:]) == ["found"] + ["pose"] * 6
     assert [answer["frame_id"] for answer in answers[2:]] == [0, 1, 2, 3, 4, 5]
     assert [answer["views"] for answer in answers[2:]] == [1, 2, 3, 4, 5, 5]
@@ -98,36 +93,36 @@ def test_every_frame_gets_a_pose_that_is_near_the_truth(track, category, camera_
     assert answers[-1]["latency_ms"] > 0
 
 
-def test_the_age_of_a_pose_is_told(track, category, camera_round):
+def test_the_age_of_a_pose_is_told(track, ball, camera_round):
     views = [message(*each) for each in enumerate(camera_round(PLACED))]
-    plain = track(views, category_id=category["id"], weight=1)
+    plain = track(views, category_id=ball["id"], weight=1)
     assert [answer["data_age_s"] for answer in plain[2:]] == pytest.approx([0, 0.05, 0.1, 0.15, 0.2, 0.2])
-    smoothed = track(views, category_id=category["id"], weight=0.25)
+    smoothed = track(views, category_id=ball["id"], weight=0.25)
     assert smoothed[-1]["data_age_s"] > plain[-1]["data_age_s"]
-    assert track(views, category_id=category["id"], weight=1, window=1)[-1]["data_age_s"] == 0
+    assert track(views, category_id=ball["id"], weight=1, window=1)[-1]["data_age_s"] == 0
 
 
-def test_the_category_is_decided_where_hello_names_none(track, category, camera_round):
+def test_the_category_is_decided_where_hello_names_none(track, ball, camera_round):
     answers = track([message(*each) for each in enumerate(camera_round(PLACED, 3))], window=3)
     assert answers[0]["category_id"] is None
     decided = next(answer for answer in answers if answer["type"] == "pose")
     assert (decided["outcome"], decided["similarities"][0]["name"]) == ("known", "ball")
-    assert answers[-1]["category_id"] == category["id"]
+    assert answers[-1]["category_id"] == ball["id"]
     assert (answers[-1]["outcome"], answers[-1]["similarities"]) == (None, [])
 
 
-def test_an_object_of_no_category_gets_no_pose(track, category, camera_round):
+def test_an_object_of_no_category_gets_no_pose(track, ball, camera_round):
     answers = track([message(*each) for each in enumerate(camera_round(PLACED, 2, "dark"))])
     assert kinds(answers[1:]) == ["pose", "pose"]
     assert answers[-1]["pose"] is None
     assert (answers[-1]["outcome"], "no category" in answers[-1]["reason"]) == ("novel", True)
 
 
-def test_a_lost_object_is_held_for_a_while_then_announced_and_found_again(track, category, camera_round):
+def test_a_lost_object_is_held_for_a_while_then_announced_and_found_again(track, ball, camera_round):
     seen = camera_round(PLACED, 3)
     blank = [message(number, seen[0], rgb=png(np.zeros((160, 160, 3), np.uint8))) for number in (3, 4, 5)]
     frames = [*(message(*each) for each in enumerate(seen)), *blank, message(6, seen[0])]
-    answers = track(frames, category_id=category["id"])
+    answers = track(frames, category_id=ball["id"])
     assert kinds(answers[1:]) == ["found", "pose", "pose", "pose", "pose", "pose", "lost", "pose", "found", "pose"]
     held, last_blank = answers[5], answers[8]
     assert (held["measured"], held["pose"] is not None, held["reason"] is not None) == (False, True, True)
@@ -135,12 +130,10 @@ def test_a_lost_object_is_held_for_a_while_then_announced_and_found_again(track,
     assert (last_blank["pose"], last_blank["data_age_s"]) == (None, None)
 
 
-def test_a_moved_object_is_followed_once_its_new_place_is_sure(track, category, camera_round):
+def test_a_moved_object_is_followed_once_its_new_place_is_sure(track, ball, camera_round):
     views = [*camera_round(PLACED, 4), *camera_round(MOVED, 10)]
     answers = [
-        each
-        for each in track([message(*each) for each in enumerate(views)], category_id=category["id"], window=3)
-        if each["type"] == "pose"
+        each for each in track([message(*each) for each in enumerate(views)], category_id=ball["id"], window=3) if each["type"] == "pose"
     ]
     places = np.array([answer["pose"]["world_from_object"] for answer in answers])[:, :2, 3]
     assert np.linalg.norm(places[3] - PLACED.translation[:2]) < 0.03
@@ -159,9 +152,9 @@ def test_a_moved_object_is_followed_once_its_new_place_is_sure(track, category, 
         ({"surprise": 1}, "surprise"),
     ],
 )
-def test_a_frame_that_cannot_be_used_is_told_and_the_next_is_answered(track, category, camera_round, changes, field):
+def test_a_frame_that_cannot_be_used_is_told_and_the_next_is_answered(track, ball, camera_round, changes, field):
     views = camera_round(PLACED, 3)
-    answers = track([message(0, views[0]), message(1, views[1], **changes), message(2, views[2])], category_id=category["id"])
+    answers = track([message(0, views[0]), message(1, views[1], **changes), message(2, views[2])], category_id=ball["id"])
     problem = answers[3]
     assert (problem["type"], problem["problem"]["status"], problem["problem"]["field"]) == ("problem", 422, field)
     assert (answers[4]["type"], answers[4]["frame_id"]) == ("pose", 2)
@@ -247,30 +240,30 @@ def solves(monkeypatch):
     return sought
 
 
-def test_an_object_is_followed_from_its_last_pose_without_seeking_it(track, category, camera_round, solves):
-    answers = track([message(*each) for each in enumerate(camera_round(PLACED, 9))], category_id=category["id"], window=2)
+def test_an_object_is_followed_from_its_last_pose_without_seeking_it(track, ball, camera_round, solves):
+    answers = track([message(*each) for each in enumerate(camera_round(PLACED, 9))], category_id=ball["id"], window=2)
     assert len(solves) <= 4  # the window is full with the second frame
     assert all(answer["measured"] for answer in answers[2:])
     matrix = answers[-1]["pose"]["target_from_reference"]
     assert rotation_angle_deg(np.array(matrix["matrix"])[:3, :3] / matrix["scale"], PLACED.rotation) < 5
 
 
-def test_an_object_that_jumped_is_sought_anew(track, category, camera_round, solves):
-    track([message(*each) for each in enumerate(camera_round(PLACED, 6))], category_id=category["id"], window=2)
+def test_an_object_that_jumped_is_sought_anew(track, ball, camera_round, solves):
+    track([message(*each) for each in enumerate(camera_round(PLACED, 6))], category_id=ball["id"], window=2)
     before = len(solves)
     views = [*camera_round(PLACED, 6), *camera_round(MOVED, 6)]
-    answers = track([message(*each) for each in enumerate(views)], category_id=category["id"], window=2)
+    answers = track([message(*each) for each in enumerate(views)], category_id=ball["id"], window=2)
     assert len(solves) - before > before
     assert np.linalg.norm(np.array(answers[-1]["pose"]["world_from_object"])[:2, 3] - MOVED.translation[:2]) < 0.03
 
 
-def test_what_is_followed_for_long_is_sought_anew(client, track, category, camera_round, solves):
+def test_what_is_followed_for_long_is_sought_anew(client, track, ball, camera_round, solves):
     client.app.state.warm = SOUGHT_EACH_FRAME
-    track([message(*each) for each in enumerate(camera_round(PLACED, 5))], category_id=category["id"], window=2)
+    track([message(*each) for each in enumerate(camera_round(PLACED, 5))], category_id=ball["id"], window=2)
     assert len(solves) == 5
 
 
-def test_a_solve_that_lays_the_object_on_worse_than_the_last_pose_is_not_believed(client, track, category, camera_round, monkeypatch):
+def test_a_solve_that_lays_the_object_on_worse_than_the_last_pose_is_not_believed(client, track, ball, camera_round, monkeypatch):
     estimate = tracker.PoseEstimator.estimate
     count = [0]
 
@@ -282,7 +275,7 @@ def test_a_solve_that_lays_the_object_on_worse_than_the_last_pose_is_not_believe
 
     monkeypatch.setattr(tracker.PoseEstimator, "estimate", misled)
     client.app.state.warm = SOUGHT_EACH_FRAME
-    answers = track([message(*each) for each in enumerate(camera_round(PLACED, 9))], category_id=category["id"], window=3)
+    answers = track([message(*each) for each in enumerate(camera_round(PLACED, 9))], category_id=ball["id"], window=3)
     assert count == [9]
     last = answers[-1]["pose"]["target_from_reference"]
     assert rotation_angle_deg(np.array(last["matrix"])[:3, :3] / last["scale"], PLACED.rotation) < 10

@@ -17,9 +17,12 @@ from core.scan import ScanRequest
 from core.sim3 import Sim3
 from core.views import Burst, Camera, View
 from store.memory import Memory
+from store.observations import Answer
 from store.records import Category
 
 VIEWS, PATCHES, DIM = 3, 5, 8
+NOVEL, KNOWN = (Answer(outcome, None, None, None, None, None, None, {}) for outcome in ("novel", "known"))
+"""Answers of which nothing else is kept."""
 
 
 @pytest.fixture

@@ -13,10 +13,8 @@ from core.reference import Reference
 from core.scan import ScanRequest
 from core.views import Burst
 from store.memory import Memory
-from store.observations import Answer
 from store.records import Category
-
-NOVEL = Answer("novel", None, None, None, None, None, None, {})
+from tests.store.conftest import NOVEL
 
 
 @pytest.fixture

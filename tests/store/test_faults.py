@@ -19,12 +19,11 @@ from core.views import Burst
 from store import retention
 from store.connection import TRIAL
 from store.memory import Memory
-from store.observations import Answer
 from store.records import Category
 from store.sweep import FOLDERS
 from tests.faults import Disk, failing, tapped
+from tests.store.conftest import NOVEL
 
-NOVEL = Answer("novel", None, None, None, None, None, None, {})
 LONG_S = 20
 
 

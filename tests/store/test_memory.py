@@ -13,10 +13,8 @@ from core.reference import Reference
 from core.scan import ScanRequest
 from core.views import Burst
 from store.memory import Memory
-from store.observations import Answer
 from store.retention import Retention
-
-NOVEL = Answer("novel", None, None, None, None, None, None, {})
+from tests.store.conftest import NOVEL
 
 
 def test_an_empty_memory_has_version_0_and_nothing_in_it(memory: Memory) -> None:

@@ -18,10 +18,9 @@ from core.scan import look_at
 from core.sim3 import Sim3
 from core.views import Burst
 from store.memory import Memory
-from store.observations import Answer, Joins
+from store.observations import Joins
 from store.records import Category
-
-KNOWN = Answer("known", None, None, None, None, None, None, {})
+from tests.store.conftest import KNOWN
 
 
 @pytest.fixture(scope="module")

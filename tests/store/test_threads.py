@@ -14,11 +14,11 @@ from core.errors import Conflict, InvalidInput, NotFound
 from core.reference import Reference
 from core.views import Burst
 from store.memory import Memory
-from store.observations import Answer, Joins
+from store.observations import Joins
 from store.retention import Retention
+from tests.store.conftest import KNOWN
 
 STEPS = 12
-KNOWN = Answer("known", None, None, None, None, None, None, {})
 
 
 def test_threads_do_not_tear_each_other(folder: Path, reference: Reference, burst: Burst, encoded: EncodedBurst, tmp_path: Path) -> None:

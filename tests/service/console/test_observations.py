@@ -18,12 +18,6 @@ TURNED = Sim3(1.3, np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]]), np.array([0.2
 
 
 @pytest.fixture
-def ball(learn):
-    """A category."""
-    return learn("bright", "ball")
-
-
-@pytest.fixture
 def seen(client, ball, look, parts):
     """An object of it that stands elsewhere."""
     return client.post("/v1/observations", files=parts(look(world_from_object=TURNED)), params={"category_id": ball["id"]}).json()
