@@ -39,14 +39,15 @@ class Sim3:
     @staticmethod
     def from_matrix(matrix: FloatArray) -> Sim3:
         """From a 4×4 matrix [[λR, t], [0, 1]]. Raises InvalidInput where λR is no scaled rotation."""
-        linear = np.asarray(matrix, dtype=float)[:3, :3]
+        matrix = np.asarray(matrix, dtype=float)
+        linear = matrix[:3, :3]
         determinant = float(np.linalg.det(linear))
         if determinant <= 0:
             raise InvalidInput("matrix", f"determinant is {determinant:.2g}; a similarity has a positive one")
         scale = determinant ** (1 / 3)
         if np.abs(linear.T @ linear / scale**2 - np.eye(3)).max() > 1e-3:
             raise InvalidInput("matrix", "its 3×3 block is not a rotation times one scale")
-        return Sim3(scale, linear / scale, np.asarray(matrix, dtype=float)[:3, 3])
+        return Sim3(scale, linear / scale, matrix[:3, 3])
 
     def as_matrix(self) -> FloatArray:
         """[[λR, t], [0, 1]], shape (4, 4)."""
@@ -114,7 +115,7 @@ def umeyama(source: FloatArray, target: FloatArray, weights: FloatArray | None =
     covariance = (target_centred * weight[:, None]).T @ source_centred
     variance = float(weight @ (source_centred**2).sum(axis=1))
     u, singular, vt = np.linalg.svd(covariance)
-    if variance <= 0 or singular[1] <= RANK_TOLERANCE * singular[0]:
+    if singular[1] <= RANK_TOLERANCE * singular[0]:
         raise NoPose("the correspondences lie on one line or point, so their rotation is not determined")
     signs = np.array([1.0, 1.0, np.sign(np.linalg.det(u @ vt))])
     rotation = (u * signs) @ vt

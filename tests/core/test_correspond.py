@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import torch
 
 from core.correspond import PatchSet, match
 
@@ -44,7 +45,7 @@ def test_the_longer_cycle_ranks_after_the_shorter() -> None:
     """Patches 1 and 2 both return to patch 0, one cell and five cells away; 2 is the more similar."""
     reference = np.array([[1, 0, 0], [0.8, 0.6, 0], [0.9, 0, 0.4359]], dtype=np.float32)
     target = np.array([[1, 0, 0]], dtype=np.float32)
-    assert match(patches(reference), patches(target), 3, "cyclical").reference_patch[0, 0].tolist() == [0, 1, 2]
+    assert match(patches(reference), patches(target), 3).reference_patch[0, 0].tolist() == [0, 1, 2]
     assert match(patches(reference), patches(target), 3, "nearest").reference_patch[0, 0].tolist() == [0, 2, 1]
 
 
@@ -90,4 +91,8 @@ def test_a_view_without_patches_matches_nothing() -> None:
 
 
 def test_views_of_which_none_has_patches_match_nothing() -> None:
-    assert not match(patches(EYE[:0]), patches(EYE[:0]), 4).valid.any()
+    assert match(patches(EYE[:0]), patches(EYE[:0]), 4).valid.tolist() == [[[False]]]
+
+
+def test_similarities_take_no_more_memory_than_descriptors() -> None:
+    assert match(patches(EYE), patches(EYE), 4).similarity.dtype == torch.float32

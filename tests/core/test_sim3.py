@@ -48,6 +48,17 @@ def test_matrix_round_trip(transform: Sim3) -> None:
     assert same(Sim3.from_matrix(transform.as_matrix()), transform)
 
 
+def test_a_matrix_by_hand() -> None:
+    rotation = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
+    matrix = Sim3(2.0, rotation, np.array([3.0, 4, 5])).as_matrix()
+    assert matrix.tolist() == [[0, -2, 0, 3], [2, 0, 0, 4], [0, 0, 2, 5], [0, 0, 0, 1]]
+
+
+def test_a_matrix_of_single_precision_is_gone_on_with_in_double() -> None:
+    transform = Sim3.from_matrix(np.eye(4, dtype=np.float32))
+    assert (transform.rotation.dtype, transform.translation.dtype) == (np.float64, np.float64)
+
+
 @given(similarities())
 def test_umeyama_recovers_an_exact_similarity(transform: Sim3) -> None:
     assert same(umeyama(POINTS, transform.apply(POINTS)), transform)
