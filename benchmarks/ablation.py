@@ -15,7 +15,7 @@ from benchmarks.pair_jobs import PairJob, pair_jobs
 from benchmarks.pairs import ViewCounts
 from benchmarks.parallel import map_jobs
 from benchmarks.tables import print_table, write_json
-from core.backbones.dino import load_backbone
+from core.backbones import load_backbone
 from core.encode import Encoder
 from core.errors import NoPose
 from core.hypotheses import HypothesesConfig

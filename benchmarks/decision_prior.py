@@ -21,7 +21,7 @@ from benchmarks.agreements import agreements
 from benchmarks.encoded import encode_all, read_views
 from benchmarks.matches import matches
 from clients.datasets.folders import find_sequences
-from core.backbones.dino import load_backbone
+from core.backbones import load_backbone
 from core.calibration import SHIPPED
 from core.encode import Encoder
 from core.evidence import COHORT, cohort_level

@@ -13,8 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.cached import code_hash
-from benchmarks.encoded import SOURCES, read_encoded, write_encoded
+from benchmarks.encoded import encoder_key, read_encoded, write_encoded
 from benchmarks.isolation import found_mask
 from clients.datasets import folders
 from core.backbones.base import Backbone, Features
@@ -38,20 +37,8 @@ class Remembering:
         new = {key: index for index, key in enumerate(keys) if key not in self._seen}
         if new:
             features = self._backbone.extract(images[list(new.values())])
-            self._seen |= {key: _part(features, place) for place, key in enumerate(new)}
-        return _joined([self._seen[key] for key in keys])
-
-
-def _part(features: Features, index: int) -> Features:
-    part = slice(index, index + 1)
-    saliency = None if features.saliency is None else features.saliency[part]
-    return Features(features.patches[part], features.cls[part], features.attention[part], saliency)
-
-
-def _joined(parts: Sequence[Features]) -> Features:
-    maps = [part.saliency for part in parts if part.saliency is not None]
-    patches, cls, attention = ([getattr(part, name) for part in parts] for name in ("patches", "cls", "attention"))
-    return Features(np.concatenate(patches), np.concatenate(cls), np.concatenate(attention), np.concatenate(maps) if maps else None)
+            self._seen |= {key: features.part(slice(place, place + 1)) for place, key in enumerate(new)}
+        return Features.joined([self._seen[key] for key in keys])
 
 
 def masked_views(sequence: folders.Sequence, encoded: Path, indices: Sequence[int]) -> list[View]:
@@ -84,7 +71,7 @@ def _something(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 
 def _key(burst: Burst, encoder: Encoder) -> str:
-    digest = hashlib.sha256(f"{encoder.backbone.fingerprint} {encoder.config} {code_hash(SOURCES)}".encode())
+    digest = hashlib.sha256(encoder_key(encoder).encode())
     for view in burst.views:
         arrays = [view.rgb, view.depth_m]
         if view.camera is not None:

@@ -28,7 +28,7 @@ from benchmarks.pair_scores import FloatArray, PairScores, auroc, hardest, neare
 from benchmarks.parallel import map_jobs
 from benchmarks.tables import Row, print_table, write_json
 from clients.datasets.sources import find_sequences
-from core.backbones.dino import load_backbone
+from core.backbones import EMBEDDED, load_backbone
 from core.calibration import Calibration, Prior
 from core.encode import EncodedBurst, Encoder
 from core.errors import InvalidInput
@@ -88,7 +88,7 @@ def run(
     episodes: int = 1000,
     length: int = 250,
     seed: int = 0,
-    backbone: str = "dinov2-s14",
+    backbone: str = EMBEDDED,
     picture: Path | None = None,
     poses: bool = True,
 ) -> list[Row]:

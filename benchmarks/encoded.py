@@ -7,6 +7,7 @@ encoder's configuration, and the source of the code that encodes. It is plain ar
 from __future__ import annotations
 
 import hashlib
+import inspect
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
@@ -24,8 +25,19 @@ from core.backbones.weights import cache_folder
 from core.encode import EncodedBurst, Encoder
 from core.packing import burst_as_arrays, burst_from_arrays
 
-SOURCES = ("views.py", "encode.py", "crop.py", "depth.py", "foreground.py", "packing.py", "backbones/*.py")
-"""Files of core/ that decide what an encoding is: a changed method never meets an old cache."""
+SOURCES = (
+    "views.py",
+    "encode.py",
+    "crop.py",
+    "depth.py",
+    "foreground.py",
+    "packing.py",
+    "backbones/base.py",
+    "backbones/dino.py",
+    "backbones/saliency.py",
+    "backbones/whitening.py",
+)
+"""Files of core/ that decide what an encoding is, beside the backbone's own: a changed method never meets an old cache."""
 
 
 def encode_all(sequences: Sequence[folders.Sequence], encoder: Encoder, folder: Path | None = None) -> list[Path]:
@@ -71,8 +83,14 @@ def write_encoded(file: Path, encoded: EncodedBurst) -> None:
     write(file, lambda stream: np.savez(stream, allow_pickle=False, **arrays))
 
 
+def encoder_key(encoder: Encoder) -> str:
+    """What an encoding depends on beside the burst."""
+    own = hashlib.sha256(Path(inspect.getfile(type(encoder.backbone))).read_bytes()).hexdigest()
+    return f"{encoder.backbone.fingerprint} {encoder.config} {code_hash(SOURCES)} {own}"
+
+
 def _key(sequence: folders.Sequence, encoder: Encoder) -> str:
-    digest = hashlib.sha256(f"{encoder.backbone.fingerprint} {encoder.config} {code_hash(SOURCES)}".encode())
+    digest = hashlib.sha256(encoder_key(encoder).encode())
     digest.update(sequence.reader.cameras(sequence).encode())
     for file in sequence.reader.files(sequence):
         if file.exists():

@@ -20,7 +20,7 @@ from benchmarks.pair_scores import FloatArray, auroc, nearest_accuracy, same_and
 from benchmarks.parallel import map_jobs
 from benchmarks.tables import Row, print_table, write_json
 from clients.datasets.sources import find_sequences
-from core.backbones.dino import load_backbone
+from core.backbones import load_backbone
 from core.backbones.whitening import Whitening
 from core.calibration import Prior
 from core.encode import Encoder

@@ -20,7 +20,7 @@ from benchmarks.synthetic_tokens import Levels, SyntheticTokens
 from benchmarks.tables import print_table, write_json
 from clients.datasets.samples import data_or_samples
 from clients.datasets.sources import find_sequences
-from core.backbones.dino import load_backbone
+from core.backbones import EMBEDDED, load_backbone
 from core.encode import EncodedBurst, Encoder
 from core.errors import InvalidInput
 
@@ -100,7 +100,7 @@ def run(
     rounds: int = 40,
     exact_up_to: int = 1000,
     data: Path | None = None,
-    backbone: str = "dinov2-s14",
+    backbone: str = EMBEDDED,
     seed: int = 0,
 ) -> list[GrowthRow]:
     """A row for each size; prints a table.
@@ -142,7 +142,7 @@ def synthetic_tokens(data: Path | None, backbone: str, seed: int) -> tuple[Synth
     """Like the bursts of `data`, the samples where None; and how bursts match, recorded and synthetic."""
     network = load_backbone(backbone)
     if network.whitening is None:
-        raise InvalidInput("backbone", f"{backbone} ships no statistics of its tokens to draw from; take dinov2-s14")
+        raise InvalidInput("backbone", f"{backbone} ships no statistics of its tokens to draw from; take {EMBEDDED}")
     sequences = find_sequences(data_or_samples(data))
     files = encode_all(sequences, Encoder(network))
     recorded = [(sequence.category, read_views(file)) for sequence, file in zip(sequences, files)]

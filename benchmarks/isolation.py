@@ -18,7 +18,7 @@ from benchmarks.encoded import encode_all, read_encoded
 from benchmarks.tables import print_table, write_json
 from clients.datasets import folders
 from clients.datasets.sources import find_sequences
-from core.backbones.dino import load_backbone
+from core.backbones import EMBEDDED, load_backbone
 from core.encode import EncodedView, Encoder, EncoderConfig
 from core.errors import InvalidInput
 
@@ -54,7 +54,7 @@ def run(
     json: Path | None,
     sources: Sequence[str] = SOURCES,
     limit: int | None = None,
-    backbone: str = "dinov2-s14",
+    backbone: str = EMBEDDED,
 ) -> list[IsolationRow]:
     """Compares `sources` of foreground on up to `limit` sequences a category of `data`; prints and returns the table.
 

@@ -23,7 +23,7 @@ from clients.simulator.raycast.export import around
 from clients.simulator.raycast.model import Model
 from clients.simulator.raycast.world import RaycastWorld
 from core.agreement import agreeing
-from core.backbones.dino import load_backbone
+from core.backbones import EMBEDDED, load_backbone
 from core.encode import EncodedBurst, Encoder
 from core.errors import InvalidInput, NoObject, NoPose
 from core.evidence import sample_patches
@@ -103,7 +103,7 @@ def run(
     looks: int = 2,
     rate: float = 0.01,
     seed: int = 0,
-    backbone: str = "dinov2-s14",
+    backbone: str = EMBEDDED,
 ) -> list[Row]:
     """Meets `instances` objects of each category, all categories of the world where none is named, and prints a table.
 

@@ -26,7 +26,7 @@ from benchmarks.tables import print_table, write_json
 from clients.datasets import folders
 from clients.datasets.sources import find_sequences
 from clients.pose_error import NO_POSE, PoseError, accuracy, median, pose_error, rotation_error_deg
-from core.backbones.dino import load_backbone
+from core.backbones import EMBEDDED, load_backbone
 from core.boxes import remove_outliers
 from core.encode import EncodedBurst, Encoder
 from core.errors import InvalidInput, NoPose
@@ -111,7 +111,7 @@ MEAN_COLUMNS = COLUMNS[COLUMNS.index("acc30") : COLUMNS.index("method")]
 """What an "all" row averages over categories."""
 
 
-def run(data: Path, sweep: Sweep, limit: int | None, json: Path | None, seed: int = 0, backbone: str = "dinov2-s14") -> list[PoseRow]:
+def run(data: Path, sweep: Sweep, limit: int | None, json: Path | None, seed: int = 0, backbone: str = EMBEDDED) -> list[PoseRow]:
     """Estimates the pairs of `data` under every setting of `sweep`; prints and returns the table.
 
     Args:

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from benchmarks.pair_jobs import PairJob, pair_jobs
 from benchmarks.parallel import map_jobs
 from benchmarks.tables import print_table, write_json
-from core.backbones.dino import load_backbone
+from core.backbones import load_backbone
 from core.confidence import SHIPPED, Confidence, evidence
 from core.encode import Encoder
 from core.errors import NoPose

@@ -27,8 +27,8 @@ from benchmarks.tables import Row, print_table, write_json
 from clients.datasets import folders
 from clients.datasets.sources import find_sequences
 from clients.pose_error import NO_POSE, PoseError, accuracy, median, pose_error
+from core.backbones import EMBEDDED, load_backbone
 from core.backbones.base import Backbone
-from core.backbones.dino import load_backbone
 from core.encode import Encoder
 from core.errors import InvalidInput, NoObject
 from core.sim3 import Sim3
@@ -105,7 +105,7 @@ def run(
     categories: Sequence[str] = (),
     strongest: int | None = None,
     seed: int = 0,
-    backbone: str = "dinov2-s14",
+    backbone: str = EMBEDDED,
     poses: bool = True,
 ) -> list[Row]:
     """Degrades up to `limit` objects a category of `data`; prints and returns a row for each strength, and one for each degradation.

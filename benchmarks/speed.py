@@ -22,7 +22,7 @@ from benchmarks.tables import print_table, write_json
 from clients.datasets import folders
 from clients.datasets.samples import data_or_samples
 from clients.datasets.sources import find_sequences
-from core.backbones.dino import load_backbone
+from core.backbones import EMBEDDED, load_backbone
 from core.backbones.whitening import Whitening
 from core.boxes import cloud_extent_m
 from core.depth import complete
@@ -81,7 +81,7 @@ def run(
     data: Path | None = None,
     views: int = 10,
     rounds: int = 5,
-    backbone: str = "dinov2-s14",
+    backbone: str = EMBEDDED,
     device: str = "cpu",
     plot: Path | None = None,
 ) -> list[SpeedRow]:

@@ -13,8 +13,8 @@ import numpy as np
 from anyio.to_thread import run_sync
 from fastapi import FastAPI
 
+from core.backbones import load_backbone
 from core.backbones.base import Backbone
-from core.backbones.dino import load_backbone
 from core.encode import EncoderConfig
 from core.errors import OneLookError
 from core.warm import WarmConfig

@@ -140,7 +140,7 @@ class BatchingBackbone:
             return
         start = 0
         for ticket in tickets:
-            ticket.features = _slice(features, slice(start, start + len(ticket.images)))
+            ticket.features = features.part(slice(start, start + len(ticket.images)))
             start += len(ticket.images)
 
     def _passed(self, images: Images) -> Features:
@@ -153,7 +153,7 @@ class BatchingBackbone:
             if not _out_of_memory(error) or len(images) == 1:
                 raise
             half = len(images) // 2
-            return _joined(self._passed(images[:half]), self._passed(images[half:]))
+            return Features.joined([self._passed(images[:half]), self._passed(images[half:])])
         finally:
             self._began = None
         self._failed = False
@@ -171,16 +171,3 @@ class BatchingBackbone:
 
 def _out_of_memory(error: Exception) -> bool:
     return isinstance(error, (MemoryError, torch.OutOfMemoryError)) or CPU_ALLOCATOR in str(error)
-
-
-def _joined(first: Features, second: Features) -> Features:
-    saliency = None if first.saliency is None or second.saliency is None else np.concatenate([first.saliency, second.saliency])
-    patches, cls, attention = (
-        np.concatenate([getattr(each, name) for each in (first, second)]) for name in ("patches", "cls", "attention")
-    )
-    return Features(patches, cls, attention, saliency)
-
-
-def _slice(features: Features, part: slice) -> Features:
-    saliency = None if features.saliency is None else features.saliency[part]
-    return Features(features.patches[part], features.cls[part], features.attention[part], saliency)

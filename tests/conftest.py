@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 from hypothesis import settings
 
-from core.backbones.base import Backbone, Features
+from core.backbones.base import Backbone, Features, shown_patches
 from core.sim3 import Sim3
 from core.views import Camera, View
 
@@ -53,10 +53,10 @@ class ColourBackbone:
         self.calls += 1
         views, side = images.shape[:2]
         grid = side // self.patch_size
-        seen = images[..., 3:].any(axis=3) if images.shape[3] == 4 else np.ones(images.shape[:3], dtype=bool)
-        images = images[..., :3] * seen[..., None]
+        shown = shown_patches(images, self.patch_size).reshape(views, grid, grid)
+        images = images[..., :3] * shown.repeat(self.patch_size, axis=1).repeat(self.patch_size, axis=2)[..., None]
         patches = images.reshape(views, grid, self.patch_size, grid, self.patch_size, 3).mean(axis=(2, 4))
-        tokens = np.cos(patches @ self._waves + self._phases).astype(np.float32)
+        tokens = (np.cos(patches @ self._waves + self._phases) * shown[..., None]).astype(np.float32)
         attention, saliency = ((each.max(axis=3) > 25).astype(np.float32) for each in (patches, images))
         return Features(tokens, tokens.mean(axis=(1, 2)), attention, saliency)
 
@@ -124,9 +124,60 @@ def ellipsoid() -> type[Ellipsoid]:
 @pytest.fixture(scope="session")
 def embedded_backbone() -> Backbone:
     """The real one, loaded once for all tests."""
-    from core.backbones.dino import load_backbone
+    from core.backbones import load_backbone
 
     return load_backbone()
+
+
+@pytest.fixture(scope="session")
+def prove_backbone() -> Callable[[Backbone], None]:
+    """prove_backbone(backbone): it keeps what `Backbone` promises."""
+    return _prove_backbone
+
+
+def _prove_backbone(backbone: Backbone) -> None:
+    grid, side = 8, 8 * backbone.patch_size
+    images = np.random.default_rng(0).integers(0, 255, (3, side, side, 3)).astype(np.uint8)
+    whole = _arrays(backbone.extract(images))
+    shapes = {"patches": (3, grid, grid, backbone.dim), "cls": (3, backbone.dim), "attention": (3, grid, grid)}
+    if backbone.has_saliency:
+        shapes["saliency"] = (3, side, side)
+    assert {name: array.shape for name, array in whole.items()} == shapes
+    for name, array in whole.items():
+        assert array.dtype == np.float32, name
+        assert np.isfinite(array).all(), name
+    for name in shapes.keys() - {"patches", "cls"}:
+        assert whole[name].min() >= 0, name
+        assert whole[name].max() <= 1, name
+    assert np.allclose(whole["attention"].max(axis=(1, 2)), 1)
+    assert backbone.fingerprint
+    for index in range(3):  # what an image gives is its own, whatever comes with it
+        for name, array in _arrays(backbone.extract(images[index : index + 1])).items():
+            assert _alike(array[0], whole[name][index]), name
+
+    shown = np.zeros((3, grid, grid), np.uint8)
+    shown[0, 1:4, 2:5], shown[1] = 1, 1  # a part, all, nothing
+    alpha = shown.repeat(backbone.patch_size, axis=1).repeat(backbone.patch_size, axis=2)[..., None]
+    parts, scribbled = (
+        _arrays(backbone.extract(np.concatenate([each, alpha], axis=3))) for each in (images, np.where(alpha, images, 255 - images))
+    )
+    for name, array in parts.items():
+        assert np.array_equal(array, scribbled[name]), name  # what is transparent lends no context
+        assert _alike(array[1], whole[name][1]), name
+        assert not array[2].any(), name
+    hidden = {"patches": shown == 0, "attention": shown == 0, "saliency": alpha[..., 0] == 0}
+    for name in parts.keys() - {"cls"}:
+        assert not parts[name][hidden[name]].any(), name
+    assert parts["patches"][shown > 0].any(axis=1).all()
+
+
+def _arrays(features: Features) -> dict[str, NDArray[np.float32]]:
+    return {name: array for name, array in vars(features).items() if array is not None}
+
+
+def _alike(first: NDArray[np.float32], second: NDArray[np.float32]) -> bool:
+    """As far as products of half precision allow."""
+    return bool(np.abs(first - second).max() <= 0.02 * np.abs(second).max())
 
 
 @contextmanager

@@ -14,7 +14,7 @@ app = typer.Typer(help="Measure accuracy, discovery, speed, isolation, symmetrie
 Data = Annotated[Path, typer.Option(help=f"Recorded objects: {SOURCE}.")]
 JsonFile = Annotated[Path | None, typer.Option("--json", help='File for {"meta": …, "rows": …}.')]
 Seed = Annotated[int, typer.Option(help="Of every random choice.")]
-Backbone = Annotated[str, typer.Option(help="dinov2-s14, dino-s8, or a folder of the DINO family.")]
+Backbone = Annotated[str, typer.Option(help="Name of a backbone (docs/operations.md), or a folder of the DINO family.")]
 Categories = Annotated[list[str] | None, typer.Option(help="Category of the simulator; may be repeated; all where left out.")]
 Samples = Annotated[Path | None, typer.Option(help="Folder of recorded objects; the samples of the repository where left out.")]
 Url = Annotated[str | None, typer.Option(help="A service of this machine; one of its own where left out.")]

@@ -153,7 +153,7 @@ def device(settings: Settings) -> Finding:
 
 def weights(settings: Settings) -> Finding:
     """The backbone's, where they are on this machine: loaded, to see that they are whole."""
-    from core.backbones.dino import EMBEDDED, load_backbone
+    from core.backbones import EMBEDDED, load_backbone
     from core.backbones.weights import FOLDER_NAME, cache_folder
 
     folder = cache_folder() / FOLDER_NAME

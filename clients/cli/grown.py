@@ -52,13 +52,14 @@ def _measure(probe: Probe) -> GrowthRow:
     import numpy as np
 
     from benchmarks.growth import GrowthRow
+    from core.backbones import EMBEDDED
     from core.backbones.whitening import Whitening
     from core.enrolled import NEAREST
     from service.compute import Solver
     from service.judgement import Judge
     from store.memory import Memory
 
-    whitening = Whitening.shipped("dinov2-s14")
+    whitening = Whitening.shipped(EMBEDDED)
 
     def decide(memory: Memory, burst: EncodedBurst) -> Decision:
         from core.novelty import DecisionConfig

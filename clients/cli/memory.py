@@ -140,7 +140,7 @@ def reembed(
     json: Json = False,
 ) -> None:
     """Compute the memory anew from its views, with another backbone or again with the same. The service must not run on the folder."""
-    from core.backbones.dino import load_backbone
+    from core.backbones import load_backbone
     from service.features import features_as_arrays
     from store.memory import Memory
 

@@ -44,7 +44,7 @@ def serve(
     host: Annotated[str | None, typer.Option(help="Address to listen on; 127.0.0.1 where left out.")] = None,
     port: Annotated[int | None, typer.Option(help="Port; 8000 where left out, 0 takes a free one.")] = None,
     data_dir: Annotated[Path | None, typer.Option(help="Folder of the memory; in the user's data folder where left out.")] = None,
-    backbone: Annotated[str | None, typer.Option(help="dinov2-s14 (where left out), dino-s8, or a folder of the DINO family.")] = None,
+    backbone: Annotated[str | None, typer.Option(help="Name of a backbone, dinov2-s14 where left out, or a folder.")] = None,
     device: Annotated[str | None, typer.Option(help="Torch device: cpu where left out, cuda, cuda:1.")] = None,
     threshold: Annotated[float | None, typer.Option(help="Least similarity of a known object; the score's own where left out.")] = None,
     cluster: Annotated[bool, typer.Option("--cluster", help="On Ray Serve: what computes is in processes of its own.")] = False,

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -14,17 +13,16 @@ from torch import Tensor, nn
 from transformers import AttentionInterface, AutoModel
 from transformers.utils import logging as transformers_logging
 
-from core.backbones.base import Features
+from core.backbones import EMBEDDED
+from core.backbones.base import Backbone, Features, Load, Report, fingerprint, shown_patches
 from core.backbones.saliency import SaliencyDecoder
-from core.backbones.weights import SALIENCY_FILE, Report, embedded_weights
+from core.backbones.weights import SALIENCY_FILE, embedded_weights
 from core.backbones.whitening import Whitening
 from core.errors import Unavailable
 
 IMAGENET_MEAN = (0.485, 0.456, 0.406)
 IMAGENET_DEVIATION = (0.229, 0.224, 0.225)
 PREPROCESSING = "rgb-imagenet-1"
-EMBEDDED = "dinov2-s14"
-HUB_NAMES = {"dino-s8": "facebook/dino-vits8"}
 MATCHING_LAYER = 9
 """Block, counted from 0, whose tokens serve as descriptors. The embedded weights' last block was fine-tuned for
 saliency; block 9 of 12 matched best across instances, and serves the paper's DINO as well (Amir et al. 2021)."""
@@ -61,7 +59,7 @@ class DinoBackbone:
         self._decoder = decoder.eval().requires_grad_(False).to(device) if decoder else None
         self._blocks = _blocks(model)
         self._layer, self._device, self._dtype, self._batch = min(layer, len(self._blocks) - 1), device, dtype, batch
-        self.fingerprint = _fingerprint([model, decoder], whitening, f"{PREPROCESSING}:layer{self._layer}")
+        self.fingerprint = fingerprint([model, decoder] if decoder else [model], whitening, f"{PREPROCESSING}:layer{self._layer}")
         for module in self._blocks.modules():
             if isinstance(module, nn.Linear):
                 module.to(dtype)  # once, rather than in every pass
@@ -69,7 +67,7 @@ class DinoBackbone:
     def extract(self, images: NDArray[np.uint8]) -> Features:
         """See `Backbone.extract`. Images that show as many patches share passes of up to `batch`; large ones share less on a CPU."""
         grid = images.shape[1] // self.patch_size
-        shown = _shown_patches(images, self.patch_size)
+        shown = shown_patches(images, self.patch_size)
         counts = shown.sum(axis=1)
         features = Features(
             np.zeros((len(images), grid, grid, self.dim), np.float32),
@@ -149,23 +147,17 @@ def fast_dtype(device: str) -> torch.dtype:
     return torch.bfloat16 if native else torch.float32
 
 
-def load_backbone(
-    name: str = EMBEDDED,
-    *,
-    device: str = "cpu",
-    dtype: torch.dtype | None = None,
-    layer: int = MATCHING_LAYER,
-    report: Report = lambda message: None,
+def load(
+    source: str | Path, name: str, *, device: str = "cpu", dtype: torch.dtype | None = None, layer: int = MATCHING_LAYER
 ) -> DinoBackbone:
-    """A backbone by name (`dinov2-s14`, `dino-s8`), by folder in the hub's layout, or by hub name.
+    """Any of the family, from a folder in the hub's layout or by hub name, to be called `name`.
 
-    `dtype` is of the products, `fast_dtype(device)` where left out; tokens of different ones can be compared.
+    `dtype` is of the products, `fast_dtype(device)` where left out.
 
-    Raises Unavailable, naming the remedy, when the weights are not there and cannot be fetched.
+    Raises Unavailable where that cannot be loaded, or is no ViT.
     """
     dtype = fast_dtype(device) if dtype is None else dtype
     attention = PRODUCTS if torch.device(device).type == "cpu" and dtype != torch.float32 else "sdpa"  # fused is slow there
-    source: str | Path = embedded_weights(report=report) if name == EMBEDDED else HUB_NAMES.get(name, name)
     transformers_logging.disable_progress_bar()  # type: ignore[no-untyped-call]
     try:
         model = AutoModel.from_pretrained(source, attn_implementation=attention, dtype=torch.float32)
@@ -175,6 +167,14 @@ def load_backbone(
     decoder = SaliencyDecoder.load(decoder_file) if decoder_file.exists() else None
     whitening = Whitening.shipped(name) if layer == MATCHING_LAYER else None
     return DinoBackbone(model, name, layer=layer, decoder=decoder, whitening=whitening, device=device, dtype=dtype)
+
+
+def _embedded(*, device: str, dtype: torch.dtype | None, report: Report) -> Backbone:
+    return load(embedded_weights(report=report), EMBEDDED, device=device, dtype=dtype)
+
+
+def _dino_s8(*, device: str, dtype: torch.dtype | None, report: Report) -> Backbone:
+    return load("facebook/dino-vits8", "dino-s8", device=device, dtype=dtype)
 
 
 def _attend(
@@ -195,15 +195,6 @@ def _blocks(model: Any) -> nn.ModuleList:
     raise Unavailable(f"{type(model).__name__} has no list of transformer blocks: not a ViT")
 
 
-def _shown_patches(images: NDArray[np.uint8], patch_size: int) -> NDArray[np.bool_]:
-    """Which patches are not transparent all over, shape (V, G²)."""
-    grid = images.shape[1] // patch_size
-    if images.shape[3] == 3:
-        return np.ones((len(images), grid * grid), dtype=bool)
-    cells = images[..., 3].reshape(len(images), grid, patch_size, grid, patch_size)
-    return np.asarray(cells.any(axis=(2, 4)).reshape(len(images), -1))
-
-
 def _keep(caught: dict[str, Tensor], name: str) -> Callable[[nn.Module, Any, Any], None]:
     def hook(module: nn.Module, inputs: Any, output: Any) -> None:
         caught[name] = output
@@ -211,12 +202,4 @@ def _keep(caught: dict[str, Tensor], name: str) -> Callable[[nn.Module, Any, Any
     return hook
 
 
-def _fingerprint(parts: list[nn.Module | None], whitening: Whitening | None, preprocessing: str) -> str:
-    digest = hashlib.sha256(preprocessing.encode())
-    for part in parts:
-        for name, tensor in sorted(part.state_dict().items() if part else ()):
-            digest.update(name.encode())
-            digest.update(tensor.cpu().numpy().tobytes())
-    if whitening:
-        digest.update(whitening.mean.tobytes() + whitening.matrix.tobytes())
-    return digest.hexdigest()[:16]
+OFFERS: Mapping[str, Load] = {EMBEDDED: _embedded, "dino-s8": _dino_s8}

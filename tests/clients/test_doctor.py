@@ -11,7 +11,7 @@ from types import SimpleNamespace
 import pytest
 from typer.testing import CliRunner, Result
 
-import core.backbones.dino
+import core.backbones
 from clients.cli import app, doctor
 from clients.cli.doctor import Finding, State
 from core.errors import Unavailable
@@ -25,7 +25,7 @@ def machine(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("ONELOOK_DATA_DIR", str(tmp_path / "memory"))
     monkeypatch.setenv("ONELOOK_CACHE", str(tmp_path / "cache"))
     (tmp_path / "cache" / doctor_weights()).mkdir(parents=True)
-    monkeypatch.setattr(core.backbones.dino, "load_backbone", lambda name: SimpleNamespace(name=name, fingerprint="0123456789abcdef"))
+    monkeypatch.setattr(core.backbones, "load_backbone", lambda name: SimpleNamespace(name=name, fingerprint="0123456789abcdef"))
     with socket.create_server(("127.0.0.1", 0)) as taken:
         free = taken.getsockname()[1]
     monkeypatch.setenv("ONELOOK_PORT", str(free))
@@ -101,7 +101,7 @@ def test_weights_that_are_broken(monkeypatch: pytest.MonkeyPatch) -> None:
     def broken(name: str) -> None:
         raise Unavailable("model.safetensors is broken; delete the folder")
 
-    monkeypatch.setattr(core.backbones.dino, "load_backbone", broken)
+    monkeypatch.setattr(core.backbones, "load_backbone", broken)
     assert findings()["weights"] == Finding("weights", State.bad, "model.safetensors is broken; delete the folder")
 
 

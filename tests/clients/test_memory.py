@@ -11,7 +11,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from clients.cli import app
-from core.backbones import dino
+from core import backbones
 from core.backbones.base import Backbone
 from core.encode import Encoder
 from core.reference import build_reference
@@ -122,7 +122,7 @@ def test_another_backbone_computes_it_anew(tmp_path: Path, backbone: Backbone, e
     with Memory.open(tmp_path) as learnt:
         learnt.require_backbone("first", "first-1")
         learnt.categories.create(build_reference(encoded), burst, encoded)
-    monkeypatch.setattr(dino, "load_backbone", lambda *_, **__: backbone)
+    monkeypatch.setattr(backbones, "load_backbone", lambda *_, **__: backbone)
     done = answered("reembed", "--backbone", "colour", "--data-dir", tmp_path)
     assert (done["fingerprint"], done["categories"], done["instances"]) == ("colour-1", 1, 1)
     assert answered("info", "--data-dir", tmp_path)["backbone"] == "colour"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -9,8 +10,9 @@ import pytest
 import torch
 from transformers import Dinov2Config, Dinov2Model, Dinov2WithRegistersConfig, Dinov2WithRegistersModel, ViTConfig, ViTModel
 
-from core.backbones import weights
-from core.backbones.dino import DinoBackbone, load_backbone
+from core.backbones import BACKBONES, EMBEDDED, load_backbone, weights
+from core.backbones.base import Backbone
+from core.backbones.dino import DinoBackbone, load
 from core.errors import Unavailable
 
 TINY = {"hidden_size": 24, "num_hidden_layers": 3, "num_attention_heads": 2, "intermediate_size": 48}
@@ -31,22 +33,29 @@ def tiny_folder(kind: str, folder: Path) -> Path:
     return folder
 
 
+def test_the_folder_offers_its_backbones_by_name() -> None:
+    assert set(BACKBONES) == {"dino-s8", EMBEDDED}
+
+
 @pytest.mark.parametrize(("kind", "patch"), [("dino", 8), ("dinov2", 14), ("registers", 14)])
-def test_any_dino_folder_loads(kind: str, patch: int, tmp_path: Path) -> None:
-    backbone = load_backbone(str(tiny_folder(kind, tmp_path)))
-    features = backbone.extract(IMAGES)
-    side = 112 // patch
-    assert backbone.patch_size == patch
-    assert features.patches.shape == (3, side, side, 24)
-    assert features.cls.shape == (3, 24)
-    assert features.attention.shape == (3, side, side)
-    assert np.allclose(features.attention.max(axis=(1, 2)), 1)
-    assert features.saliency is None
+def test_any_dino_folder_loads(kind: str, patch: int, tmp_path: Path, prove_backbone: Callable[[Backbone], None]) -> None:
+    backbone = load_backbone(str(tiny_folder(kind, tmp_path)), dtype=torch.float32)
+    assert (backbone.patch_size, backbone.dim, backbone.has_saliency) == (patch, 24, False)
+    prove_backbone(backbone)
+
+
+def test_the_embedded_one_keeps_the_contract(embedded_backbone: Backbone, prove_backbone: Callable[[Backbone], None]) -> None:
+    assert (embedded_backbone.name, embedded_backbone.patch_size, embedded_backbone.has_saliency) == (EMBEDDED, 14, True)
+    prove_backbone(embedded_backbone)
+
+
+def test_what_stands_in_for_backbones_keeps_the_contract(backbone: Backbone, prove_backbone: Callable[[Backbone], None]) -> None:
+    prove_backbone(backbone)
 
 
 def test_tokens_and_attention_are_the_models_own(tmp_path: Path) -> None:
     """Against transformers' full output with every hidden state and attention."""
-    backbone = load_backbone(str(tiny_folder("dinov2", tmp_path)), layer=1, dtype=torch.float32)
+    backbone = load(tiny_folder("dinov2", tmp_path), "tiny", layer=1, dtype=torch.float32)
     model = Dinov2Model.from_pretrained(tmp_path, attn_implementation="eager").eval()
     mean, deviation = np.array([0.485, 0.456, 0.406]), np.array([0.229, 0.224, 0.225])
     pixels = torch.from_numpy(((IMAGES / 255 - mean) / deviation).transpose(0, 3, 1, 2)).float()
@@ -83,25 +92,6 @@ def test_attention_as_products_is_transformers_own(kind: str, tmp_path: Path) ->
     assert np.allclose(products.cls, eager.cls, atol=0.02)
 
 
-@pytest.mark.parametrize("kind", ["dino", "dinov2", "registers"])
-def test_transparent_patches_take_no_part(kind: str, tmp_path: Path) -> None:
-    backbone = load_backbone(str(tiny_folder(kind, tmp_path)), dtype=torch.float32)
-    patch = backbone.patch_size
-    grid = 112 // patch
-    shown = np.zeros((3, grid, grid), np.uint8)
-    shown[0, 1:4, 2:5], shown[1] = 1, 1
-    alpha = shown.repeat(patch, axis=1).repeat(patch, axis=2)[..., None]
-    found = backbone.extract(np.concatenate([IMAGES, alpha], axis=3))
-    scribbled = np.where(alpha > 0, IMAGES, 255 - IMAGES).astype(np.uint8)
-    again = backbone.extract(np.concatenate([scribbled, alpha], axis=3))
-    assert np.array_equal(found.patches[0], again.patches[0])
-    assert np.array_equal(found.cls, again.cls)
-    assert found.patches[0][shown[0] > 0].any(axis=1).all()
-    assert not found.patches[0][shown[0] == 0].any()
-    assert np.allclose(found.patches[1], backbone.extract(IMAGES).patches[1], atol=1e-5)
-    assert not found.cls[2].any()
-
-
 def test_the_fast_tokens_are_those_of_single_precision(tmp_path: Path) -> None:
     folder = str(tiny_folder("dinov2", tmp_path))
     exact, fast = (load_backbone(folder, dtype=dtype) for dtype in (torch.float32, torch.bfloat16))
@@ -112,13 +102,13 @@ def test_the_fast_tokens_are_those_of_single_precision(tmp_path: Path) -> None:
 
 
 def test_the_fingerprint_tells_weights_and_layers_apart(tmp_path: Path) -> None:
-    folder = str(tiny_folder("dinov2", tmp_path))
-    assert load_backbone(folder, layer=1).fingerprint == load_backbone(folder, layer=1).fingerprint
-    assert load_backbone(folder, layer=1).fingerprint != load_backbone(folder, layer=2).fingerprint
+    folder = tiny_folder("dinov2", tmp_path)
+    assert load(folder, "tiny", layer=1).fingerprint == load(folder, "tiny", layer=1).fingerprint
+    assert load(folder, "tiny", layer=1).fingerprint != load(folder, "tiny", layer=2).fingerprint
 
 
-def test_a_missing_folder_names_the_remedy(tmp_path: Path) -> None:
-    with pytest.raises(Unavailable, match=r"config\.json"):
+def test_a_missing_folder_names_the_remedy_and_the_names_there_are(tmp_path: Path) -> None:
+    with pytest.raises(Unavailable, match=r"config\.json.*dino-s8, dinov2-s14"):
         load_backbone(str(tmp_path / "nothing"))
 
 

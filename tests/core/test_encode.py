@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from clients.datasets.folders import Sequence, find_sequences, load_burst
-from core.backbones.dino import DinoBackbone, load_backbone
+from core.backbones import load_backbone
+from core.backbones.base import Backbone
 from core.encode import EncodedBurst, Encoder, EncoderConfig
 from core.errors import InvalidInput, NoObject
 from core.pose import PoseEstimator
@@ -21,7 +22,7 @@ SAMPLES = Path(__file__).parents[1] / "data" / "bursts"
 
 
 @pytest.fixture(scope="module")
-def backbone() -> DinoBackbone:
+def backbone() -> Backbone:
     return load_backbone()
 
 
@@ -36,12 +37,12 @@ def burst(sequence: Sequence) -> Burst:
 
 
 @pytest.fixture(scope="module")
-def encoded(backbone: DinoBackbone, burst: Burst) -> EncodedBurst:
+def encoded(backbone: Backbone, burst: Burst) -> EncodedBurst:
     return Encoder(backbone).encode(burst)
 
 
 @pytest.mark.parametrize("foreground", ["attention", "saliency"])
-def test_the_object_is_found_without_its_mask(foreground: str, backbone: DinoBackbone, sequence: Sequence) -> None:
+def test_the_object_is_found_without_its_mask(foreground: str, backbone: Backbone, sequence: Sequence) -> None:
     burst = load_burst(sequence, [0], masks=True)
     mask = burst.views[0].mask
     assert mask is not None
@@ -51,7 +52,7 @@ def test_the_object_is_found_without_its_mask(foreground: str, backbone: DinoBac
     assert len(found.cells) * (found.window.size / found.grid) ** 2 > 0.6 * mask.sum(), "and cover most of it"
 
 
-def test_a_second_pass_that_sees_less_finds_the_same_object(backbone: DinoBackbone, burst: Burst, encoded: EncodedBurst) -> None:
+def test_a_second_pass_that_sees_less_finds_the_same_object(backbone: Backbone, burst: Burst, encoded: EncodedBurst) -> None:
     near = Encoder(backbone, EncoderConfig(context=2)).encode(burst)
     for view, whole in zip(near.views, encoded.views):
         assert view.window == whole.window
@@ -65,7 +66,7 @@ def test_points_lie_on_the_object(encoded: EncodedBurst, sequence: Sequence) -> 
     assert (np.linalg.norm(in_model, axis=1) < 0.6).mean() > 0.95
 
 
-def test_encoding_again_gives_the_same_numbers(encoded: EncodedBurst, backbone: DinoBackbone, burst: Burst) -> None:
+def test_encoding_again_gives_the_same_numbers(encoded: EncodedBurst, backbone: Backbone, burst: Burst) -> None:
     again = Encoder(backbone).encode(burst)
     assert all(np.array_equal(first.descriptors, second.descriptors) for first, second in zip(encoded.views, again.views))
 
@@ -82,7 +83,7 @@ def moved_burst(burst: Burst, moved: Sim3) -> Burst:
     return Burst(views)
 
 
-def test_a_similarity_applied_to_real_views_is_recovered(encoded: EncodedBurst, backbone: DinoBackbone, burst: Burst, moved: Sim3) -> None:
+def test_a_similarity_applied_to_real_views_is_recovered(encoded: EncodedBurst, backbone: Backbone, burst: Burst, moved: Sim3) -> None:
     target = Encoder(backbone).encode(moved_burst(burst, moved))
     found = PoseEstimator().estimate(build_reference(encoded), target).target_from_reference
     assert rotation_angle_deg(found.rotation, moved.rotation) < 1
@@ -90,7 +91,7 @@ def test_a_similarity_applied_to_real_views_is_recovered(encoded: EncodedBurst, 
     assert np.linalg.norm(found.translation - moved.translation) < 0.02
 
 
-def test_a_mask_replaces_attention(backbone: DinoBackbone, burst: Burst) -> None:
+def test_a_mask_replaces_attention(backbone: Backbone, burst: Burst) -> None:
     mask = np.zeros(burst.views[0].size, dtype=bool)
     mask[40:80, 60:120] = True
     view = Encoder(backbone).encode(Burst([replace(burst.views[0], mask=mask)])).views[0]
@@ -98,13 +99,13 @@ def test_a_mask_replaces_attention(backbone: DinoBackbone, burst: Burst) -> None
     assert ((x > 58) & (x < 121) & (y > 38) & (y < 81)).all()
 
 
-def test_a_blank_wall_shows_no_object(backbone: DinoBackbone) -> None:
+def test_a_blank_wall_shows_no_object(backbone: Backbone) -> None:
     wall = View(np.full((240, 320, 3), 128, np.uint8))
     with pytest.raises(NoObject, match="send masks"):
         Encoder(backbone).encode(Burst([wall]))
 
 
-def test_saliency_of_a_backbone_without_it_is_refused(burst: Burst, backbone: DinoBackbone, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_saliency_of_a_backbone_without_it_is_refused(burst: Burst, backbone: Backbone, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(backbone, "has_saliency", False)
     monkeypatch.setattr(backbone, "_decoder", None)
     with pytest.raises(InvalidInput, match="attention"):
