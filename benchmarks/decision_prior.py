@@ -36,10 +36,11 @@ def main(data: Annotated[Path, typer.Option(help="folder of bursts")], out: Anno
     files = encode_all(sequences, Encoder(backbone))
     bursts = [read_views(file) for file in track(files, "reading")]
     labels = np.unique([sequence.category for sequence in sequences], return_inverse=True)[1]
-    typer.echo(f"wrote {write(out, labels, matches(bursts, backbone.whitening)[0], agreements(files, backbone.whitening))}")
+    match, agreement = matches(bursts, backbone.whitening)[0], agreements(files, backbone.whitening)
+    typer.echo(f"wrote {write(out, backbone.fingerprint, labels, match, agreement)}")
 
 
-def write(out: Path, labels: NDArray[np.intp], match: FloatArray, agreement: FloatArray) -> Path:
+def write(out: Path, fingerprint: str, labels: NDArray[np.intp], match: FloatArray, agreement: FloatArray) -> Path:
     """From the category of each burst, shape (N,), and matches and agreements of all pairs, each (N, N)."""
     cohort = float(np.mean([_level(match[_founders(labels, x, labels[x]), x]) for x in range(len(labels))]))
     wrong: list[list[tuple[float, float]]] = []
@@ -56,7 +57,13 @@ def write(out: Path, labels: NDArray[np.intp], match: FloatArray, agreement: Flo
         rivals = [max(token + weight * pose for token, pose in pairs) for pairs in wrong]
         return {"rivals": _rounded(rivals), "own": _rounded([token + weight * pose for token, pose in own])}
 
-    fields = {"cohort": round(cohort, 4), "agreement_weight": round(weight, 3), "tokens": samples(0.0), "verified": samples(weight)}
+    fields = {
+        "fingerprint": fingerprint,
+        "cohort": round(cohort, 4),
+        "agreement_weight": round(weight, 3),
+        "tokens": samples(0.0),
+        "verified": samples(weight),
+    }
     out.write_text(json.dumps(fields, indent=1) + "\n")
     return out
 

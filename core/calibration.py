@@ -51,6 +51,8 @@ class Samples:
 class Prior:
     """What ships."""
 
+    fingerprint: str
+    """Of the backbone it was measured with; with another one it is a start, and no more."""
     cohort: float
     """Usual match of a burst with the most similar of other categories."""
     agreement_weight: float
@@ -68,7 +70,7 @@ class Prior:
         """The estimate that comes with OneLook."""
         fields = json.loads(SHIPPED.read_text())
         kinds = {kind: Samples(tuple(fields[kind]["rivals"]), tuple(fields[kind]["own"])) for kind in ("tokens", "verified")}
-        return Prior(fields["cohort"], fields["agreement_weight"], kinds["tokens"], kinds["verified"])
+        return Prior(fields["fingerprint"], fields["cohort"], fields["agreement_weight"], kinds["tokens"], kinds["verified"])
 
 
 @dataclass(frozen=True)

@@ -13,10 +13,12 @@ import numpy as np
 from anyio.to_thread import run_sync
 from fastapi import FastAPI
 
-from core.backbones import load_backbone
+from core.backbones import EMBEDDED, load_backbone
 from core.backbones.base import Backbone
+from core.calibration import Prior
 from core.encode import EncoderConfig
 from core.errors import OneLookError
+from core.scores import BEST
 from core.warm import WarmConfig
 from service import errors
 from service.agent import Agent, AgentConfig
@@ -122,6 +124,8 @@ def open_agent(settings: Settings, metrics: Metrics, backbone: Backbone | None, 
 
         chosen = compute or local(BatchingBackbone(backbone or warm_backbone(settings), metrics.count_pass, settings.deadline_s))
         agent = Agent(chosen, opened, config, Events(tell))
+        if config.score == BEST and agent.backbone.fingerprint != Prior.shipped().fingerprint:
+            log.warning("thresholds start from figures of another backbone, %s, until the memory has decisions of its own", EMBEDDED)
         try:
             yield agent
         finally:

@@ -1,5 +1,9 @@
 """What a backbone gives, and the small protocol that every one follows.
 
+A file beside this one offers a backbone by the name that `ONELOOK_BACKBONE` and `--backbone` call it:
+`OFFERS: Mapping[str, Load] = {"name": function}`. Its test makes one, random and tiny, and calls the fixture `prove_backbone` on it
+(tests/core/test_backbones.py).
+
 Letters: V views, S input side in pixels, G patches a side, D token size.
 """
 

@@ -34,7 +34,7 @@ def tiny_folder(kind: str, folder: Path) -> Path:
 
 
 def test_the_folder_offers_its_backbones_by_name() -> None:
-    assert set(BACKBONES) == {"dino-s8", EMBEDDED}
+    assert {"dino-s8", EMBEDDED} <= set(BACKBONES)
 
 
 @pytest.mark.parametrize(("kind", "patch"), [("dino", 8), ("dinov2", 14), ("registers", 14)])

@@ -9,6 +9,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 import service.app
+from core.calibration import Prior
 from core.errors import Conflict, InvalidInput, OneLookError
 from service.agent import Agent
 from service.app import create_app
@@ -40,6 +41,17 @@ def test_a_memory_of_another_backbone_is_refused_at_the_start(settings, backbone
 
     with pytest.raises(Conflict, match=r"colour-1.*other-1"), TestClient(create_app(settings, backbone=Other())):
         pass
+
+
+def test_figures_of_another_backbone_are_told_at_the_start(settings, backbone, caplog):
+    class Measured(type(backbone)):
+        fingerprint = Prior.shipped().fingerprint
+
+    for network, told in ((backbone, True), (Measured(), False)):
+        caplog.clear()
+        own = settings.model_copy(update={"score": "best", "data_dir": settings.data_dir / network.fingerprint})
+        with TestClient(create_app(own, backbone=network)):
+            assert ("figures of another backbone" in caplog.text) == told
 
 
 def test_an_unknown_score_is_refused_at_the_start(settings, backbone):
