@@ -106,3 +106,18 @@ def test_names_are_those_of_living_categories(memory: Memory, category: Category
     memory.categories.rename(other.id, None)
     memory.categories.delete(category.id)
     assert memory.categories.names() == {other.id: None}
+
+
+def test_all_its_views_come_back_as_one_burst(memory: Memory, category: Category, burst: Burst) -> None:
+    found = memory.categories.burst(category.id)
+    assert [np.array_equal(mine.rgb, theirs.rgb) for mine, theirs in zip(found.views, burst.views, strict=True)] == [True] * 3
+
+
+def test_its_first_view_is_0(memory: Memory, category: Category, burst: Burst) -> None:
+    assert np.array_equal(memory.categories.view(category.id, 0).rgb, burst.views[0].rgb)
+
+
+def test_one_is_summarised_as_its_page_does(memory: Memory, category: Category, other: Category) -> None:
+    assert memory.categories.summary(other.id) == memory.categories.listing(9).categories[1]
+    with pytest.raises(NotFound):
+        memory.categories.summary("nope")

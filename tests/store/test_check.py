@@ -12,6 +12,7 @@ from core.errors import Conflict, NotFound, Unavailable
 from core.reference import Reference
 from core.scan import ScanRequest
 from core.views import Burst
+from store import backup as backups
 from store.memory import Memory
 from store.records import Category
 from tests.store.conftest import NOVEL
@@ -77,6 +78,37 @@ def test_damaged_views_of_observations_and_scans_are_named_as_such(full: Memory)
     assert {damage.kind for damage in full.check().damages} == {"observation", "scan"}
 
 
+@pytest.mark.parametrize(
+    ("place", "name", "words"),
+    [
+        (
+            "categories",
+            "reference.npz",
+            "it gets no poses, but is recognised, and every other category works; restore, reembed or delete it",
+        ),
+        (
+            "categories",
+            "000_rgb.png",
+            "this picture, and computing the category anew with another backbone; it is still recognised and has poses",
+        ),
+        ("observations", "000_rgb.png", "its pictures; nothing that was learnt, unless another backbone should compute it anew"),
+        ("scans", "000_rgb.png", "this scan cannot become a category; delete it and begin another"),
+    ],
+)
+def test_what_a_damage_costs_is_told(full: Memory, place: str, name: str, words: str) -> None:
+    flip(next((full.folder / place).rglob(name)))
+    (damage,) = full.check().damages
+    assert damage.consequence == words
+    assert (damage.name is None) == (place != "categories")
+
+
+def test_what_a_damage_in_the_bin_costs_is_told(full: Memory, category: Category) -> None:
+    full.categories.delete(category.id)
+    flip(full.categories.folder(category.id) / "reference.npz")
+    (damage,) = full.check().damages
+    assert damage.consequence == "it is deleted or merged; undoing that brings it back damaged"
+
+
 def test_damaged_tokens_are_named(full: Memory, category: Category) -> None:
     with full._connection.change() as db:
         db.execute("UPDATE instances SET pooled = zeroblob(length(pooled)) WHERE category_id = ?", [category.id])
@@ -118,13 +150,45 @@ def test_sizes_count_what_lives(full: Memory, category: Category, reference: Ref
 
 def test_a_backup_is_a_memory(full: Memory, tmp_path: Path, category: Category) -> None:
     backup = full.backup(tmp_path / "backups" / "monday")
-    assert (backup.files, backup.damages) == (full.check().files, ())
+    report = full.check()
+    assert (backup.files, backup.size, backup.damages) == (report.files, report.size, ())
     version = full.version
     full.categories.delete(category.id)
     with Memory.open(backup.folder) as copy:
         assert copy.version == version
         assert copy.check().ok
         assert [each.name for each in copy.categories.all()] == ["cup", "mug"]
+
+
+def test_a_backup_tells_how_far_it_is(full: Memory, tmp_path: Path) -> None:
+    told: list[tuple[int, int]] = []
+    backup = full.backup(tmp_path / "a", lambda done, total: told.append((done, total)))
+    done = [each for each, _ in told]
+    assert done == sorted(set(done))
+    assert (done[0] > 1, told[-1]) == (True, (backup.size, backup.size))
+
+
+def test_what_a_stopped_backup_left_is_in_nobodys_way(full: Memory, tmp_path: Path) -> None:
+    (tmp_path / ".partial-a").mkdir()
+    (tmp_path / ".partial-a" / "left").write_text("half")
+    full.backup(tmp_path / "a")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a", "memory"]
+    assert not (tmp_path / "a" / "left").exists()
+
+
+def test_a_memory_that_is_never_at_rest_is_not_backed_up(
+    full: Memory, tmp_path: Path, burst: Burst, request_for_views: ScanRequest, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(backups, "ATTEMPTS", 2)
+
+    def restless(done: int, total: int) -> None:
+        for scan in full.scans.in_progress(9):
+            full.scans.delete(scan.id)
+        full.scans.add(full.scans.create(request_for_views).id, burst)
+
+    with Memory.reading(full.folder) as reader, pytest.raises(Unavailable, match="faster than they are copied; back up later$"):
+        reader.backup(tmp_path / "a", restless)
+    assert [path.name for path in tmp_path.iterdir()] == ["memory"]
 
 
 def test_a_backup_never_replaces_anything(full: Memory, tmp_path: Path) -> None:

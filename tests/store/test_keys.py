@@ -63,7 +63,9 @@ def test_the_file_gives_no_key_away(memory: Memory, folder: Path) -> None:
 def test_a_revoked_key_finds_nobody_and_the_door_stays_locked(memory: Memory) -> None:
     assert not memory.keys.required()
     key, text = memory.keys.create("arm", "robot")
-    assert memory.keys.revoke(key.id).revoked_at is not None
+    revoked = memory.keys.revoke(key.id)
+    assert (revoked.id, revoked.name, revoked.role, revoked.created_at) == (key.id, key.name, key.role, key.created_at)
+    assert revoked.revoked_at is not None
     assert memory.keys.find(text) is None
     assert memory.keys.all() == []
     assert memory.keys.required()

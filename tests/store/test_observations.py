@@ -11,15 +11,17 @@ from scipy.spatial.transform import Rotation
 from core.boxes import OrientedBox
 from core.encode import EncodedBurst
 from core.errors import Conflict, NotFound
+from core.grounds import Grounds
 from core.matches import Alternative
 from core.novelty import Decision
+from core.quality import ViewFault
 from core.reference import Reference
 from core.scan import ScanRequest
 from core.sim3 import Sim3
 from core.views import Burst
 from store.memory import Memory
 from store.observations import Answer
-from store.records import Pose
+from store.records import Category, Pose
 
 FEATURES = {"a": np.arange(3)}
 NOVEL = Answer("novel", None, "map", Decision("novel", "paper_mean", 0.4, (("x", 0.1),)), None, None, None, {"total": 12.5})
@@ -83,6 +85,31 @@ def test_its_scan_begins_in_the_same_step(memory: Memory, burst: Burst, request_
 def test_the_latest_come_first(memory: Memory, burst: Burst) -> None:
     ids = [memory.observations.create(NOVEL, burst, FEATURES).id for _ in range(3)]
     assert [seen.id for seen in memory.observations.latest(2)] == [ids[2], ids[1]]
+
+
+def test_only_those_asked_for_are_listed(memory: Memory, category: Category, burst: Burst) -> None:
+    novel, seen, again = (
+        memory.observations.create(answer, burst, FEATURES).id for answer in (NOVEL, known(category.id), known(category.id))
+    )
+    assert [each.id for each in memory.observations.latest(9, before=again)] == [seen, novel]
+    assert [each.id for each in memory.observations.latest(9, category_id=category.id)] == [again, seen]
+    assert [each.id for each in memory.observations.latest(9, outcome="novel")] == [novel]
+    assert [each.id for each in memory.observations.latest(9, before=again, category_id=category.id, outcome="known")] == [seen]
+    with pytest.raises(NotFound):
+        memory.observations.latest(9, before="nope")
+
+
+def test_all_its_views_come_back_as_one_burst(memory: Memory, burst: Burst) -> None:
+    found = memory.observations.burst(memory.observations.create(NOVEL, burst, FEATURES).id)
+    assert [np.array_equal(mine.rgb, theirs.rgb) for mine, theirs in zip(found.views, burst.views, strict=True)] == [True] * 3
+
+
+def test_where_to_look_next_and_what_it_rests_on_come_back(memory: Memory, burst: Burst) -> None:
+    told = Grounds(3, 2, 1, 40.0, ((ViewFault("blur", "it is blurred"),), (), ()))
+    poses = np.stack([np.eye(4), 2 * np.eye(4)])
+    seen = memory.observations.create(replace(NOVEL, grounds=told, viewpoints=poses), burst, FEATURES)
+    assert seen.grounds == told
+    assert np.array_equal(seen.viewpoints, poses)
 
 
 def test_deleting_its_category_keeps_the_observation(memory: Memory, reference: Reference, burst: Burst, encoded: EncodedBurst) -> None:

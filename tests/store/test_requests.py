@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from datetime import timedelta
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from core.encode import EncodedBurst
 from core.errors import Conflict
+from core.reference import Reference
 from core.scan import ScanRequest
+from core.sim3 import Sim3
+from core.views import Burst
 from store.memory import Memory
+from store.records import Category
 from store.requests import Reply
 from store.retention import Retention
+from tests.store.conftest import NOVEL
 
 DONE = Reply(201, "application/json", b"{}")
 
@@ -92,3 +100,59 @@ def test_keeping_a_key_is_no_change_to_read(memory: Memory) -> None:
     with memory.requests.once("k", "r", "d") as once:
         once.reply = DONE
     assert memory.version == before
+
+
+def noted(memory: Memory, change: Callable[[], object]) -> str:
+    """What a repeated request would be told that this change made."""
+    with memory.requests.once("k", "r", "d"):
+        change()
+    (row,) = memory._connection.rows("SELECT result_id FROM requests")
+    return row["result_id"]
+
+
+CHANGES: dict[str, Callable[[Memory, str, str], object]] = {
+    "rename": lambda memory, this, other: memory.categories.rename(this, "x"),
+    "delete": lambda memory, this, other: memory.categories.delete(this),
+    "merge": lambda memory, this, other: memory.categories.merge(other, this),
+}
+
+
+@pytest.mark.parametrize("kind", CHANGES)
+def test_of_a_changed_category_that_category_is_noted(kind: str, memory: Memory, category: Category, other: Category) -> None:
+    assert noted(memory, lambda: CHANGES[kind](memory, category.id, other.id)) == category.id
+
+
+def test_of_a_split_the_new_category_is_noted(
+    memory: Memory, category: Category, other: Category, reference: Reference, burst: Burst
+) -> None:
+    memory.categories.merge(category.id, other.id)
+    moved = memory.instances.of(other.id)[0].id
+    made = noted(memory, lambda: memory.categories.split(other.id, [moved], reference, burst))
+    assert memory.instances.get(moved).category_id == made
+
+
+def test_of_an_undoing_its_entry_is_noted(memory: Memory, category: Category) -> None:
+    memory.categories.rename(category.id, "x")
+    renamed = memory.audit.latest(1)[0].id
+    assert noted(memory, lambda: memory.undo(renamed)) == memory.audit.get(renamed).undone_by
+
+
+def test_of_an_import_its_entry_is_noted(second: Memory, archive: Path) -> None:
+    assert noted(second, lambda: second.import_archive(archive)) == second.audit.latest(1)[0].id
+
+
+def test_of_a_deleted_goal_that_goal_is_noted(memory: Memory, category: Category) -> None:
+    goal = memory.goals.create(category.id, None, Sim3.identity()).id
+    assert noted(memory, lambda: memory.goals.delete(goal)) == goal
+
+
+def test_of_a_correction_the_observation_is_noted(memory: Memory, category: Category, burst: Burst, encoded: EncodedBurst) -> None:
+    seen = memory.observations.create(NOVEL, burst, {"a": np.arange(3)}).id
+    assert noted(memory, lambda: memory.corrections.to_category(seen, category.id, encoded)) == seen
+
+
+def test_of_a_correction_to_a_new_category_the_observation_is_noted(
+    memory: Memory, reference: Reference, burst: Burst, encoded: EncodedBurst
+) -> None:
+    seen = memory.observations.create(NOVEL, burst, {"a": np.arange(3)}).id
+    assert noted(memory, lambda: memory.corrections.to_new(seen, reference, burst, encoded)) == seen

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -73,3 +74,35 @@ def test_deleting_forgets_rows_and_views(memory: Memory, request_for_views: Scan
     assert not memory.scans.folder(scan.id).exists()
     with pytest.raises(NotFound):
         memory.scans.get(scan.id)
+
+
+def test_what_was_said_of_each_burst_comes_back_in_order(memory: Memory, request_for_views: ScanRequest, burst: Burst) -> None:
+    scan = memory.scans.create(request_for_views)
+    for report in ({"accepted": [0, 1]}, None):
+        memory.scans.add(scan.id, burst, report)
+    assert memory.scans.reports(scan.id) == [{"accepted": [0, 1]}, None]
+    with pytest.raises(NotFound):
+        memory.scans.reports("nope")
+
+
+def test_a_scan_may_ask_for_other_viewpoints(memory: Memory, request_for_views: ScanRequest) -> None:
+    scan = memory.scans.create(request_for_views)
+    changed = memory.scans.replace_request(scan.id, replace(request_for_views, radius_m=0.5))
+    assert (changed.id, changed.request.radius_m, changed.state) == (scan.id, 0.5, "requested")
+
+
+def test_a_completed_scan_asks_for_nothing_more(
+    memory: Memory, request_for_views: ScanRequest, reference: Reference, burst: Burst, encoded: EncodedBurst
+) -> None:
+    scan = memory.scans.create(request_for_views)
+    memory.categories.create(reference, burst, encoded, scan_id=scan.id)
+    with pytest.raises(Conflict, match="completed"):
+        memory.scans.replace_request(scan.id, request_for_views)
+
+
+def test_scans_are_counted_by_state(memory: Memory, request_for_views: ScanRequest, burst: Burst) -> None:
+    _, begun, over = (memory.scans.create(request_for_views) for _ in range(3))
+    memory.scans.add(begun.id, burst)
+    with memory._connection.housekeeping() as db:
+        db.execute("UPDATE scans SET expires_at = '2000-01-01' WHERE id = ?", [over.id])
+    assert memory.scans.states() == {"requested": 1, "collecting": 1, "expired": 1}

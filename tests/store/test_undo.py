@@ -78,9 +78,9 @@ def test_nothing_is_undone_twice(memory: Memory, category: Category) -> None:
     memory.categories.rename(category.id, "mug")
     entry = last(memory)
     memory.undo(entry.id)
-    with pytest.raises(Conflict, match="undone already"):
+    with pytest.raises(Conflict, match=f"^change '{entry.id}' cannot be undone: it is undone already$"):
         memory.undo(entry.id)
-    with pytest.raises(Conflict, match="of the kind undo"):
+    with pytest.raises(Conflict, match="only rename, merge, split, delete, forget, correct can be, this is of the kind undo$"):
         memory.undo(last(memory).id)
 
 
@@ -139,3 +139,74 @@ def test_the_views_of_a_merged_category_stay_as_long_as_its_burst(
         memory.instances.forget(second.id, moved.id)
         memory.prune()
         assert not memory.categories.folder(first.id).exists()
+
+
+def test_the_trail_is_read_a_page_at_a_time(memory: Memory, category: Category) -> None:
+    for name in ("b", "c", "d"):
+        memory.categories.rename(category.id, name)
+    newest, older = memory.audit.latest(2)
+    assert [entry.after["name"] for entry in memory.audit.latest(2, before=older.id)] == ["b", "cup"]
+    assert memory.audit.latest(9)[0].id == newest.id
+    assert newest.created_at >= older.created_at
+    with pytest.raises(NotFound, match="^no change has the id 'nope'$"):
+        memory.audit.latest(2, before="nope")
+
+
+def test_the_trail_of_a_category_tells_what_came_from_others_and_went_to_them(
+    memory: Memory, category: Category, other: Category, reference: Reference, burst: Burst
+) -> None:
+    memory.categories.merge(category.id, other.id)
+    moved = memory.instances.of(other.id)[0]
+    part = memory.categories.split(other.id, [moved.id], reference, burst)
+    memory.categories.rename(part.id, "bowl")
+    assert [entry.action for entry in memory.audit.of(other.id, 9)] == ["split", "merge", "create"]
+    assert [entry.action for entry in memory.audit.of(part.id, 9)] == ["rename", "split"]
+    assert [entry.action for entry in memory.audit.of(other.id, 1)] == ["split"]
+
+
+def test_a_deletion_is_told_whole(memory: Memory, category: Category) -> None:
+    memory.categories.delete(category.id, actor="anna")
+    entry = last(memory)
+    assert (entry.action, entry.category_id, entry.actor) == ("delete", category.id, "anna")
+    assert (entry.before, entry.after) == ({"name": "cup", "instances": 1}, {})
+
+
+def test_a_merge_is_told_whole(memory: Memory, category: Category, other: Category) -> None:
+    (moved,) = memory.instances.of(category.id)
+    memory.categories.merge(category.id, other.id, actor="anna")
+    entry = last(memory)
+    assert (entry.action, entry.category_id, entry.actor) == ("merge", category.id, "anna")
+    assert (entry.before, entry.after) == ({"name": "cup", "instances": [moved.id]}, {"into": other.id})
+
+
+def test_a_split_is_told_whole(memory: Memory, category: Category, other: Category, reference: Reference, burst: Burst) -> None:
+    (mine,) = memory.instances.of(category.id)
+    memory.categories.merge(category.id, other.id)
+    part = memory.categories.split(other.id, [mine.id], reference, burst, name="bowl", actor="anna")
+    entry = last(memory)
+    assert (entry.action, entry.category_id, entry.actor) == ("split", other.id, "anna")
+    assert (entry.before, entry.after) == ({"instances": [mine.id]}, {"category": part.id, "name": "bowl"})
+
+
+def test_forgetting_an_instance_is_told_whole(memory: Memory, category: Category, other: Category) -> None:
+    memory.categories.merge(category.id, other.id)
+    first = memory.instances.of(other.id)[0]
+    memory.instances.forget(other.id, first.id, actor="anna")
+    entry = last(memory)
+    assert (entry.action, entry.category_id, entry.actor) == ("forget", other.id, "anna")
+    assert (entry.before, entry.after) == ({"instance": first.id}, {})
+
+
+def test_an_undoing_is_told_whole(memory: Memory, category: Category) -> None:
+    memory.categories.delete(category.id)
+    deleted = last(memory)
+    undone = memory.undo(deleted.id, actor="anna")
+    assert (undone.action, undone.category_id, undone.actor) == ("undo", category.id, "anna")
+    assert (undone.before, undone.after) == ({"entry": deleted.id, "action": "delete"}, {})
+
+
+def test_an_errand_is_told_whole(memory: Memory) -> None:
+    memory.note("backup", {"folder": "/var/backups"}, actor="anna")
+    entry = last(memory)
+    assert (entry.action, entry.category_id, entry.actor, entry.undoable) == ("backup", None, "anna", False)
+    assert (entry.before, entry.after) == ({}, {"folder": "/var/backups"})

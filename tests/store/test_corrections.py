@@ -1,0 +1,164 @@
+"""What a person says an observation was of: its burst goes there, and comes back."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from core.encode import EncodedBurst
+from core.errors import Conflict, NotFound
+from core.reference import Reference
+from core.views import Burst
+from store.memory import Memory
+from store.observations import Joins
+from store.records import AuditEntry, Category, Instance, Observation
+from tests.store.conftest import KNOWN, NOVEL
+
+FEATURES = {"a": np.arange(3)}
+
+
+@pytest.fixture
+def unassigned(memory: Memory, category: Category, burst: Burst) -> Observation:
+    """Nobody said what it was of."""
+    return memory.observations.create(NOVEL, burst, FEATURES)
+
+
+@pytest.fixture
+def assigned(memory: Memory, category: Category, burst: Burst, encoded: EncodedBurst) -> Observation:
+    """Taken for the category."""
+    joins = Joins(category.id, encoded, 0.9, "decision")
+    return memory.observations.create(replace(KNOWN, category_id=category.id), burst, FEATURES, joins=joins)
+
+
+def assignment(memory: Memory, seen: Observation) -> Instance | None:
+    """Where its burst is."""
+    everywhere = [each for category in memory.categories.all() for each in memory.instances.of(category.id)]
+    return next((each for each in everywhere if each.source_id == seen.id), None)
+
+
+def last(memory: Memory) -> AuditEntry:
+    return memory.audit.latest(1)[0]
+
+
+def test_an_observation_of_nothing_joins_what_is_named(memory: Memory, category: Category, unassigned: Observation, encoded) -> None:
+    memory.corrections.to_category(unassigned.id, category.id, encoded, actor="anna")
+    instance = assignment(memory, unassigned)
+    assert (instance.category_id, instance.source, instance.how, instance.similarity) == (category.id, "observation", "named", None)
+    assert instance.pictures == f"observations/{unassigned.id}"
+    assert memory.observations.get(unassigned.id).corrected_to == category.id
+
+
+def test_a_wrong_assignment_moves(memory: Memory, other: Category, assigned: Observation, encoded: EncodedBurst) -> None:
+    before = assignment(memory, assigned)
+    memory.corrections.to_category(assigned.id, other.id, encoded)
+    after = assignment(memory, assigned)
+    assert (after.id, after.category_id, after.how, after.similarity) == (before.id, other.id, "named", None)
+    assert memory.observations.get(assigned.id).corrected_to == other.id
+
+
+def test_a_new_category_is_made_of_it(
+    memory: Memory, category: Category, assigned: Observation, reference: Reference, burst: Burst, encoded: EncodedBurst
+) -> None:
+    made = memory.corrections.to_new(assigned.id, reference, burst, encoded, name="bowl", actor="anna")
+    bowl = memory.categories.get(made)
+    assert (bowl.name, bowl.views, bowl.instances) == ("bowl", 3, 1)
+    assert assignment(memory, assigned).category_id == made
+    assert np.array_equal(memory.categories.view(made, 1).rgb, burst.views[1].rgb)
+
+
+def test_what_it_is_of_already_is_no_correction(memory: Memory, category: Category, assigned: Observation, encoded: EncodedBurst) -> None:
+    with pytest.raises(Conflict, match=f"^observation '{assigned.id}' is one of category '{category.id}' already$"):
+        memory.corrections.to_category(assigned.id, category.id, encoded)
+
+
+def test_the_last_burst_of_a_category_does_not_leave(
+    memory: Memory, category: Category, assigned: Observation, reference: Reference, burst: Burst, encoded: EncodedBurst
+) -> None:
+    made = memory.corrections.to_new(assigned.id, reference, burst, encoded)
+    with pytest.raises(Conflict, match=f"^the burst is the last of category '{made}'; merge or delete that category instead$"):
+        memory.corrections.to_category(assigned.id, category.id, encoded)
+    assert assignment(memory, assigned).category_id == made
+
+
+def test_a_category_that_is_gone_gets_nothing(memory: Memory, other: Category, assigned: Observation, encoded: EncodedBurst) -> None:
+    memory.categories.delete(other.id)
+    with pytest.raises(Conflict, match="deleted or merged meanwhile"):
+        memory.corrections.to_category(assigned.id, other.id, encoded)
+
+
+def test_the_trail_says_who_and_what(memory: Memory, category: Category, other: Category, assigned: Observation, encoded) -> None:
+    before = assignment(memory, assigned)
+    memory.corrections.to_category(assigned.id, other.id, encoded, actor="anna")
+    entry = last(memory)
+    assert (entry.action, entry.category_id, entry.actor, entry.undoable) == ("correct", other.id, "anna", True)
+    was = {"id": before.id, "category_id": category.id, "how": "decision", "similarity": 0.9}
+    assert entry.before == {"assigned": was, "corrected_to": None}
+    assert entry.after == {"observation": assigned.id, "category": other.id, "instance": before.id, "made": False}
+
+
+def test_the_trail_says_that_a_category_was_made(memory: Memory, unassigned: Observation, reference, burst, encoded) -> None:
+    made = memory.corrections.to_new(unassigned.id, reference, burst, encoded, actor="anna")
+    entry = last(memory)
+    assert (entry.actor, entry.before["assigned"], entry.after["category"], entry.after["made"]) == ("anna", None, made, True)
+
+
+def test_taken_back_a_moved_burst_is_as_it_was(memory: Memory, category: Category, other: Category, assigned: Observation, encoded) -> None:
+    memory.corrections.to_category(assigned.id, other.id, encoded)
+    memory.undo(last(memory).id)
+    instance = assignment(memory, assigned)
+    assert (instance.category_id, instance.how, instance.similarity) == (category.id, "decision", 0.9)
+    assert memory.observations.get(assigned.id).corrected_to is None
+
+
+def test_taken_back_a_burst_that_was_nowhere_is_nowhere(memory: Memory, category: Category, unassigned: Observation, encoded) -> None:
+    memory.corrections.to_category(unassigned.id, category.id, encoded)
+    memory.undo(last(memory).id)
+    assert assignment(memory, unassigned) is None
+    assert memory.categories.get(category.id).instances == 1
+
+
+def test_taken_back_a_category_that_was_made_is_gone(
+    memory: Memory, category: Category, assigned: Observation, reference, burst, encoded
+) -> None:
+    made = memory.corrections.to_new(assigned.id, reference, burst, encoded)
+    memory.undo(last(memory).id)
+    with pytest.raises(NotFound):
+        memory.categories.get(made)
+    assert assignment(memory, assigned).category_id == category.id
+
+
+def test_a_second_correction_goes_back_to_the_first(memory: Memory, category: Category, other: Category, unassigned, encoded) -> None:
+    memory.corrections.to_category(unassigned.id, category.id, encoded)
+    memory.corrections.to_category(unassigned.id, other.id, encoded)
+    memory.undo(last(memory).id)
+    assert memory.observations.get(unassigned.id).corrected_to == category.id
+
+
+def test_what_was_corrected_again_since_is_not_taken_back(memory: Memory, category: Category, other: Category, unassigned, encoded) -> None:
+    memory.corrections.to_category(unassigned.id, category.id, encoded)
+    first = last(memory)
+    memory.corrections.to_category(unassigned.id, other.id, encoded)
+    with pytest.raises(Conflict, match="undo the later change first"):
+        memory.undo(first.id)
+    assert assignment(memory, unassigned).category_id == other.id
+
+
+def test_a_burst_does_not_go_back_to_a_category_that_is_gone(
+    memory: Memory, category: Category, other: Category, assigned, encoded
+) -> None:
+    memory.corrections.to_category(assigned.id, other.id, encoded)
+    corrected = last(memory)
+    memory.categories.delete(category.id)
+    with pytest.raises(Conflict, match="undo the later change first"):
+        memory.undo(corrected.id)
+
+
+def test_a_category_that_others_joined_since_is_not_taken_back(memory: Memory, unassigned, assigned, reference, burst, encoded) -> None:
+    made = memory.corrections.to_new(unassigned.id, reference, burst, encoded)
+    first = last(memory)
+    memory.corrections.to_category(assigned.id, made, encoded)
+    with pytest.raises(Conflict, match="undo the later change first"):
+        memory.undo(first.id)
+    assert memory.categories.get(made).instances == 2
