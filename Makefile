@@ -2,7 +2,7 @@
 SHELL := /bin/bash
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help setup weights demo test lint types unit browser cluster serve bench soak fuzz clean
+.PHONY: help setup weights demo test lint types unit browser cluster serve bench soak fuzz mutants clean
 
 # The python to build the environment with: the newest of 3.10 and later on the PATH.
 PYTHON ?= $(shell for name in python3.13 python3.12 python3.11 python3.10 python3 python; do \
@@ -68,6 +68,10 @@ unit: setup browser
 fuzz: setup ## feed everything that reads uploads what breaks it, ten minutes long; what it finds is kept in OUT
 	@$(BIN)/python -m tests.fuzz --seconds $(FUZZ_SECONDS) --found $(OUT)/fuzz
 
+mutants: setup ## change what core/sim3.py, core/correspond.py, core/novelty.py, core/scores/ and store/ do, a little at a time: which changes does no test notice?
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[mutants]'
+	@OMP_NUM_THREADS=1 $(BIN)/python -m tests.mutants
+
 cluster: setup ## kill the parts of a service on Ray Serve, one after the other: they come back, and nothing that was answered is lost
 	@$(BIN)/pytest tests/service/cluster/recovery.py
 
@@ -82,5 +86,5 @@ soak: setup ## two robots live with a service for half an hour; fails where it g
 	@$(BIN)/onelook bench soak --minutes 30 --robots 2 --plot $(OUT)/soak.png --json $(OUT)/soak.json
 
 clean: ## remove what make made; weights and encoded bursts stay in the user's cache
-	@rm -rf $(VENV) build *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis $(OUT)
+	@rm -rf $(VENV) build mutants *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis $(OUT)
 	@find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -19,7 +19,8 @@ def test_medians_and_ratios() -> None:
 
 def test_every_stage_is_timed(recorded: Path, monkeypatch: pytest.MonkeyPatch, backbone) -> None:
     monkeypatch.setattr(speed, "load_backbone", lambda name, device, dtype=None: backbone)
-    rows = speed.run(None, data=recorded, views=4, rounds=1)
+    monkeypatch.setattr(speed, "WARM_UP", 0)
+    rows = speed.run(None, data=recorded, views=2, rounds=1)
     totals = {row.operation for row in rows if row.stage == "total"}
     assert {"encode", "learn", "decide best, 3 poses", *(f"solve {variant}" for variant in VARIANTS)} <= totals
     assert sum(row.ratio for row in rows if row.stage == "total" and row.operation in speed.OBSERVATION) == pytest.approx(1)
