@@ -102,7 +102,7 @@ class SetSource:
 
     def begin(self, thresholds: int) -> None:
         """See `Source`."""
-        self._part = np.full((thresholds, self._room, len(self._pairs.part)), self._pairs.none, dtype=np.float32)
+        self._part = np.full((thresholds, self._room, len(self._pairs.part)), self._pairs.none)
         self._views = np.zeros((thresholds, self._room), dtype=np.intp)
 
     def nearest(self, burst: int, used: NDArray[np.intp]) -> tuple[NDArray[np.intp], FloatArray]:
