@@ -24,6 +24,7 @@ from clients.simulator.raycast.model import Model
 from clients.simulator.raycast.world import RaycastWorld
 from core.agreement import agreeing
 from core.backbones import EMBEDDED, load_backbone
+from core.camera_poses import angles_about_deg
 from core.encode import EncodedBurst, Encoder
 from core.errors import InvalidInput, NoObject, NoPose
 from core.evidence import sample_patches
@@ -31,7 +32,7 @@ from core.next_view import OFFERED, Candidate, next_viewpoints
 from core.novelty import Context, Decision, DecisionConfig, Member, decide
 from core.packing import burst_as_arrays, burst_from_arrays
 from core.reference import Reference, build_reference
-from core.scan import ScanOptions, angles_about_deg, request_scan
+from core.scan import ScanOptions, request_scan
 from core.verification import verify
 from core.views import Burst, FloatArray, View
 
@@ -183,7 +184,7 @@ def meet(job: Job) -> Case:
 def one_side(world: RaycastWorld, looks: int, seed: int) -> list[FloatArray]:
     """Neighbouring poses of those that a robot looks from before it is asked."""
     poses = np.stack(world.viewpoints(AROUND, seed))
-    return list(poses[np.argsort(angles_about_deg(poses[:1], poses, world.center_m)[0])[:looks]])
+    return list(poses[np.argsort(angles_about_deg(poses[:1, :3, 3], poses[:, :3, 3], world.center_m)[0])[:looks]])
 
 
 def verdict(decision: Decision, category: str, held: bool) -> str:

@@ -1,4 +1,4 @@
-"""The method: arrays in, arrays out. No files, SQL, HTTP or global state (weights are the one file it reads)."""
+"""The method: arrays in, arrays out. No SQL, HTTP or global state; what ships with a backbone, weights and statistics, is all it reads."""
 
 import os
 

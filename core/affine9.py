@@ -46,11 +46,6 @@ class Affine9:
             raise InvalidInput("scales", f"expected three positive numbers, found {np.asarray(self.scales).tolist()}")
 
     @staticmethod
-    def identity() -> Affine9:
-        """Leaves every point where it is."""
-        return Affine9(np.ones(3), np.eye(3), np.zeros(3))
-
-    @staticmethod
     def from_similarity(b_from_a: Sim3) -> Affine9:
         """The same transform, with its one scale for every axis."""
         return Affine9(np.full(3, b_from_a.scale), b_from_a.rotation, b_from_a.translation)
@@ -65,10 +60,6 @@ class Affine9:
     def apply(self, points: FloatArray) -> FloatArray:
         """Points of frame a, shape (*, 3), in frame b."""
         return points * self.scales @ self.rotation.T + self.translation
-
-    def apply_inverse(self, points: FloatArray) -> FloatArray:
-        """Points of frame b, shape (*, 3), in frame a."""
-        return (points - self.translation) @ self.rotation / self.scales
 
     def then(self, c_from_b: Sim3) -> Affine9:
         """c_from_a."""

@@ -1,4 +1,4 @@
-"""Every error OneLook raises on purpose.
+"""The root of every error OneLook raises on purpose, and the branches of the method and the memory; service/ and clients/ have their own.
 
 OneLookError
 ├── InvalidInput        a field of the caller's input is wrong; names the field

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from core.camera_poses import angles_about_deg
 from core.coherence import incoherent
 from core.encode import EncodedBurst
 from core.quality import ViewFault, faults, region_of_encoded
@@ -65,6 +66,5 @@ def _spread_deg(encoded: EncodedBurst) -> float | None:
     positions = [view.camera.world_from_camera[:3, 3] for view in encoded.views if view.camera is not None and len(view.cells)]
     if not positions or not len(encoded.cloud_m):
         return None
-    rays = np.stack(positions) - np.median(encoded.cloud_m, axis=0)
-    rays /= np.linalg.norm(rays, axis=1, keepdims=True).clip(1e-12)
-    return float(np.degrees(np.arccos(np.clip(rays @ rays.T, -1, 1)).max()))
+    places = np.stack(positions)
+    return float(angles_about_deg(places, places, np.median(encoded.cloud_m, axis=0)).max())

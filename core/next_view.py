@@ -15,11 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.backbones.whitening import Whitening
+from core.camera_poses import angles_about_deg
 from core.encode import EncodedBurst
 from core.errors import InvalidInput
 from core.evidence import Adaptation, match_views, sample_patches, whitened
 from core.reference import Reference
-from core.scan import ScanOptions, angles_about_deg, request_scan
+from core.scan import ScanOptions, request_scan
 from core.sim3 import Sim3
 
 FloatArray = NDArray[np.floating]
@@ -48,37 +49,31 @@ def next_viewpoints(encoded: EncodedBurst, candidates: Sequence[Candidate], whit
     Raises InvalidInput for views without cameras, NoObject where no depth places the object.
     """
     request = request_scan(encoded, ScanOptions(OFFERED))
-    looked = np.stack([view.camera.world_from_camera for view in encoded.views if view.camera is not None])
-    unseen = 1 - np.exp(-((angles_about_deg(request.world_from_camera, looked, request.center_m).min(axis=1) / LOOKED_DEG) ** 2))
-    worth = unseen * _difference(request.world_from_camera, request.center_m, candidates[:2], whitening)
+    offered = request.world_from_camera[:, :3, 3]
+    looked = np.stack([view.camera.world_from_camera[:3, 3] for view in encoded.views if view.camera is not None])
+    unseen = 1 - np.exp(-((angles_about_deg(offered, looked, request.center_m).min(axis=1) / LOOKED_DEG) ** 2))
+    worth = unseen * _difference(offered, request.center_m, candidates[:2], whitening)
     chosen: list[int] = []
     for index in np.argsort(-worth, kind="stable"):
-        apart = angles_about_deg(request.world_from_camera[[index]], request.world_from_camera[chosen], request.center_m)
+        apart = angles_about_deg(offered[[index]], offered[chosen], request.center_m)
         if len(chosen) < VIEWPOINTS and (apart > LOOKED_DEG).all():
             chosen.append(int(index))
     return request.world_from_camera[chosen]
 
 
-def _difference(viewpoints: FloatArray, center_m: FloatArray, candidates: Sequence[Candidate], whitening: Whitening | None) -> FloatArray:
-    """How unlike the two candidates look from each viewpoint, shape (n,): one less the match of their nearest reference views."""
+def _difference(places_m: FloatArray, center_m: FloatArray, candidates: Sequence[Candidate], whitening: Whitening | None) -> FloatArray:
+    """How unlike the two candidates look from each place, shapes (n, 3) and (n,): one less the match of their nearest reference views."""
     if len(candidates) < 2:
-        return np.ones(len(viewpoints))
+        return np.ones(len(places_m))
     predicted = []
     for candidate in candidates:
         shown = [view for view in candidate.reference.views if len(view.cells)]
         if any(view.camera is None for view in shown):
             raise InvalidInput("reference", "has a view without camera")
-        cameras = np.stack([_moved(view.camera.world_from_camera, candidate.target_from_reference) for view in shown if view.camera])
+        cameras = candidate.target_from_reference.apply(np.stack([view.camera.world_from_camera[:3, 3] for view in shown if view.camera]))
         patches = whitened(sample_patches(EncodedBurst(tuple(shown), candidate.reference.fingerprint)), whitening)
         units = Adaptation.none(patches.shape[-1]).directions(patches)
-        predicted.append((angles_about_deg(viewpoints, cameras, center_m).argmin(axis=1), units))
+        predicted.append((angles_about_deg(places_m, cameras, center_m).argmin(axis=1), units))
     (first, of_first), (second, of_second) = predicted
     pairs = {pair: 1 - float(match_views(of_first[[pair[0]]], [of_second[[pair[1]]]])[0]) for pair in set(zip(first, second))}
     return np.array([pairs[pair] for pair in zip(first, second)])
-
-
-def _moved(world_from_camera: FloatArray, target_from_reference: Sim3) -> FloatArray:
-    """A reference camera's position carried to the burst's world; its orientation is left out, since only the side counts."""
-    pose = np.eye(4)
-    pose[:3, 3] = target_from_reference.apply(world_from_camera[:3, 3])
-    return pose

@@ -19,7 +19,8 @@ from core.encode import EncodedBurst, EncodedView
 from core.errors import InvalidInput, NoPose
 from core.matched_pair import MatchedPair, require_comparable
 from core.matches import pool, rays
-from core.viewpoints import angles_deg, consensus, mean_rotation
+from core.sim3 import rotation_angle_deg
+from core.viewpoints import consensus, mean_rotation
 from core.views import FloatArray
 
 MIN_CORRESPONDENCES = 8
@@ -99,19 +100,19 @@ def estimate_orientation(
     clock.lap("match")
     rotations = pair.rotations(best)
     coarse = mean_rotation(rotations[consensus(rotations, pair.similarities(best), config.consensus_deg, seed)])
-    near = angles_deg(pair.relative.reshape(-1, 3, 3), coarse[None]).reshape(pair.similarity.shape) <= config.consensus_deg
+    near = rotation_angle_deg(pair.relative, coarse) <= config.consensus_deg
     clock.lap("views")
     found = [_two_view(pair, int(i), int(j), seed) for i, j in np.argwhere(near & (pair.similarity > 0))]
-    agreeing = [each for each in found if each and angles_deg(each.rotation[None], coarse[None])[0, 0] <= config.consensus_deg]
+    agreeing = [each for each in found if each and rotation_angle_deg(each.rotation, coarse) <= config.consensus_deg]
     if not agreeing:
         raise NoPose("no essential matrix supports the rotation that similar views suggest; send more views or views with depth")
     turns = np.stack([each.rotation for each in agreeing])
     rotation = mean_rotation(turns)
-    apart = angles_deg(pair.rotations([each.pair for each in agreeing]), rotation[None])[:, 0]
+    apart = rotation_angle_deg(pair.rotations([each.pair for each in agreeing]), rotation)
     order = sorted(range(len(agreeing)), key=lambda index: (apart[index] < MIN_PARALLAX_DEG, -agreeing[index].inliers))
     agreeing = [agreeing[index] for index in order]
     clock.lap("solve")
-    spread = float(np.sqrt((angles_deg(turns, rotation[None]) ** 2).mean()))
+    spread = float(np.sqrt((rotation_angle_deg(turns, rotation) ** 2).mean()))
     pairs = tuple(each.pair for each in agreeing)
     return Orientation(rotation, agreeing[0].direction, spread, pairs, pair.similarity, clock.stage_ms)
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
+from core.camera_poses import angles_about_deg
 from core.clock import StageClock
 from core.errors import NoPose
 from core.matched_pair import MatchedPair
@@ -181,5 +182,4 @@ def _parallax_deg(sight: Sight, pose: Sim3, inlier: NDArray[np.bool_]) -> float:
     """Largest angle between two target views that agree, at the object."""
     centre = pose.apply(sight.points[inlier].mean(axis=0))
     cameras = np.linalg.inv(sight.camera_from_world[np.unique(sight.view[inlier])])[:, :3, 3]
-    ways = (cameras - centre) / np.linalg.norm(cameras - centre, axis=1, keepdims=True)
-    return float(np.degrees(np.arccos(np.clip(ways @ ways.T, -1, 1))).max())
+    return float(angles_about_deg(cameras, cameras, centre).max())

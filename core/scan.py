@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.boxes import cloud_extent_m, remove_outliers
+from core.camera_poses import angles_about_deg, hemisphere, nearest_view
 from core.encode import EncodedBurst
 from core.errors import InvalidInput, NoObject
 from core.views import Camera
@@ -21,8 +22,6 @@ FloatArray = NDArray[np.floating]
 UpSource = Literal["given", "cameras", "assumed"]
 DEFAULT_VIEWPOINTS = 10
 """The paper scans with 10 or 20."""
-ELEVATION_RANGE_DEG = (15.0, 70.0)
-GOLDEN_ANGLE = np.pi * (3 - np.sqrt(5))
 ASSUMED_ELEVATION = np.pi / 4
 """Of a camera whose elevation cannot be told, since all views look from one direction."""
 OBJECT_SHARE = 0.5
@@ -33,6 +32,8 @@ REACH_DEG = 20.0
 """A camera this near a viewpoint, by angle about the object, shows what the viewpoint asked for. Ten viewpoints are about 45° apart."""
 CANDIDATES = 400
 """Directions tried for a replacement: about 5° apart."""
+LEAST_TURN_DEG = 15.0
+"""Cameras whose x axes lie nearer to one direction than this do not tell which way is up."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +104,7 @@ def infer_up(cameras: Sequence[Camera]) -> tuple[FloatArray, UpSource]:
     sideways = poses[:, :3, 0]
     spread, vectors = np.linalg.eigh(sideways.T @ sideways / len(poses))
     image_up = -poses[:, :3, 1].mean(axis=0)
-    if spread[1] < np.sin(np.radians(15)) ** 2 / 2:
+    if spread[1] < np.sin(np.radians(LEAST_TURN_DEG)) ** 2 / 2:
         up = np.cos(ASSUMED_ELEVATION) * -poses[0, :3, 1] - np.sin(ASSUMED_ELEVATION) * poses[0, :3, 2]
         return np.asarray(up / np.linalg.norm(up)), "assumed"
     up = vectors[:, 0] * (np.sign(vectors[:, 0] @ image_up) or 1.0)
@@ -122,11 +123,12 @@ def exclude(request: ScanRequest, unreachable: Sequence[int]) -> ScanRequest:
         raise InvalidInput("viewpoints", f"{wrong[0]} is none of the scan's viewpoints 0 to {count - 1}")
     excluded = np.concatenate([request.excluded, request.world_from_camera[sorted(set(unreachable))]])
     offered = hemisphere(request.center_m, request.up, request.radius_m, CANDIDATES)
-    offered = offered[(angles_about_deg(offered, excluded, request.center_m) > REACH_DEG).all(axis=1)]
+    offered = offered[(angles_about_deg(offered[:, :3, 3], excluded[:, :3, 3], request.center_m) > REACH_DEG).all(axis=1)]
     poses: list[FloatArray | None] = [None if index in unreachable else pose for index, pose in enumerate(request.world_from_camera)]
     for index in sorted(set(unreachable)):
-        kept = [pose for pose in poses if pose is not None]
-        nearest = angles_about_deg(offered, np.stack(kept), request.center_m).min(axis=1) if kept else np.full(len(offered), 180.0)
+        kept = [pose[:3, 3] for pose in poses if pose is not None]
+        apart = angles_about_deg(offered[:, :3, 3], np.stack(kept), request.center_m) if kept else np.full((len(offered), 1), 180.0)
+        nearest = apart.min(axis=1)
         if len(offered) and nearest.max() > REACH_DEG / 2:
             poses[index] = offered[int(nearest.argmax())]
     left = [pose for pose in poses if pose is not None]
@@ -151,86 +153,9 @@ def coverage(request: ScanRequest, world_from_camera: Sequence[FloatArray]) -> C
     """How far the views taken from these camera poses, each (4, 4), carry out a scan."""
     near = [nearest_view(pose, request.world_from_camera, request.center_m) for pose in world_from_camera]
     viewpoints = tuple(index if angle <= REACH_DEG else None for index, angle in near)
-    taken = np.stack(world_from_camera) if len(world_from_camera) else np.empty((0, 4, 4))
-    covered = np.any(angles_about_deg(request.world_from_camera, taken, request.center_m) <= REACH_DEG, axis=1)
+    taken = np.array([pose[:3, 3] for pose in world_from_camera]).reshape(-1, 3)
+    covered = np.any(angles_about_deg(request.world_from_camera[:, :3, 3], taken, request.center_m) <= REACH_DEG, axis=1)
     return Coverage(viewpoints, tuple(angle for _, angle in near), tuple(map(bool, np.atleast_1d(covered))))
-
-
-def hemisphere(center_m: FloatArray, up: FloatArray, radius_m: float, count: int) -> FloatArray:
-    """Evenly spread camera poses, shape (count, 4, 4), spiralling up between the elevations of ELEVATION_RANGE_DEG."""
-    low, high = np.sin(np.radians(ELEVATION_RANGE_DEG))
-    heights = low + (high - low) * (np.arange(count) + 0.5) / count
-    return _around(center_m, up, radius_m, heights, GOLDEN_ANGLE * np.arange(count))
-
-
-def waypoints(
-    center_m: FloatArray, up: FloatArray, radius_m: float, count: int, seed: int, world_from_camera: FloatArray | None = None
-) -> FloatArray:
-    """Random camera poses that look at a known object, shape (count, 4, 4), in the order of a short way past them all.
-
-    They are spread evenly by chance over the part of the hemisphere between the elevations of ELEVATION_RANGE_DEG (paper, "Robotic novel
-    object pose rearrangement": random waypoints from which pose estimates are inspected).
-
-    Args:
-        center_m: what they look at, in the world frame, shape (3,).
-        up: away from the support, unit vector, shape (3,).
-        radius_m: distance of each from the centre.
-        count: at least 1.
-        seed: of where they are; which are drawn does not depend on where the camera is.
-        world_from_camera: the camera's present pose, shape (4, 4), from which the way starts; from the first one drawn where left out.
-    """
-    chance = np.random.default_rng(seed)
-    low, high = np.sin(np.radians(ELEVATION_RANGE_DEG))
-    poses = _around(center_m, up, radius_m, chance.uniform(low, high, count), chance.uniform(0, 2 * np.pi, count))
-    start = poses[0] if world_from_camera is None else world_from_camera
-    return poses[short_tour(poses[:, :3, 3], start[:3, 3])]
-
-
-def short_tour(positions_m: FloatArray, start_m: FloatArray) -> list[int]:
-    """An order of positions, shape (n, 3), for a way from `start_m`, shape (3,): each is followed by the nearest of those left."""
-    here, left, order = start_m, list(range(len(positions_m))), []
-    while left:
-        order.append(left.pop(int(np.linalg.norm(positions_m[left] - here, axis=1).argmin())))
-        here = positions_m[order[-1]]
-    return order
-
-
-def _around(center_m: FloatArray, up: FloatArray, radius_m: float, heights: FloatArray, azimuth: FloatArray) -> FloatArray:
-    """Poses that look at the centre, shape (n, 4, 4), from the sines of their elevations and their azimuths in radians, shape (n,) each."""
-    level = np.cross(up, np.eye(3)[np.abs(up).argmin()])
-    level /= np.linalg.norm(level)
-    across = np.cross(up, level)
-    circle = np.sqrt(1 - heights**2)[:, None] * (np.cos(azimuth)[:, None] * level + np.sin(azimuth)[:, None] * across)
-    positions = center_m + radius_m * (circle + heights[:, None] * up)
-    return np.stack([look_at(position, center_m, up) for position in positions])
-
-
-def look_at(position_m: FloatArray, aim_m: FloatArray, up: FloatArray) -> FloatArray:
-    """world_from_camera, shape (4, 4), of a camera without roll. Raises InvalidInput where it looks along `up`."""
-    forward = aim_m - position_m
-    right = np.cross(forward, up)
-    if np.linalg.norm(right) < 1e-9 * max(float(np.linalg.norm(forward)), 1e-9):
-        raise InvalidInput("position", "is straight above or at the aim, so the camera's roll is not determined")
-    z = forward / np.linalg.norm(forward)
-    x = right / np.linalg.norm(right)
-    pose = np.eye(4)
-    pose[:3, :3] = np.stack([x, np.cross(z, x), z], axis=1)
-    pose[:3, 3] = position_m
-    return pose
-
-
-def nearest_view(world_from_camera: FloatArray, candidates: FloatArray, center_m: FloatArray) -> tuple[int, float]:
-    """Which of the candidate poses, shape (n, 4, 4), sees the object most nearly from the side of a pose, and the angle off in degrees."""
-    angles = angles_about_deg(world_from_camera[None], candidates, center_m)[0]
-    best = int(angles.argmin())
-    return best, float(angles[best])
-
-
-def angles_about_deg(first: FloatArray, second: FloatArray, center_m: FloatArray) -> FloatArray:
-    """Angles about the object between cameras, shapes (n, 4, 4) and (m, 4, 4), shape (n, m)."""
-    left, right = ((poses[:, :3, 3] - center_m) for poses in (first, second))
-    left, right = (each / np.linalg.norm(each, axis=1, keepdims=True).clip(1e-12) for each in (left, right))
-    return np.asarray(np.degrees(np.arccos(np.clip(left @ right.T, -1, 1))))
 
 
 def unit_up(up: Sequence[float]) -> FloatArray:

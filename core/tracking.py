@@ -74,10 +74,11 @@ def seen(
     """
     if track.pose is None:
         return Track(candidates[0], age_s)
-    near = [pose for pose in candidates if _near(track.pose, pose, center_m, diameter_m, config)]
+    last = track.pose
+    near = [pose for pose in candidates if _near(last, pose, center_m, diameter_m, config)]
     if near:
-        chosen = min(near, key=lambda pose: float(rotation_angle_deg(pose.rotation, _rotation(track.pose))))
-        mixed = blend(track.pose, chosen, center_m, config.weight)
+        chosen = min(near, key=lambda pose: float(rotation_angle_deg(pose.rotation, last.rotation)))
+        mixed = blend(last, chosen, center_m, config.weight)
         return Track(mixed, config.weight * age_s + (1 - config.weight) * (track.data_age_s + elapsed_s))
     again = track.jumped is not None and _near(track.jumped, candidates[0], center_m, diameter_m, config)
     jumps = track.jumps + 1 if again else 1
@@ -112,8 +113,3 @@ def _near(before: Sim3, after: Sim3, center_m: FloatArray, diameter_m: float, co
     moved_m = float(np.linalg.norm(after.apply(center_m) - before.apply(center_m)))
     turned_deg = float(rotation_angle_deg(after.rotation, before.rotation))
     return turned_deg <= config.jump_deg and moved_m <= config.jump_extent * diameter_m * before.scale
-
-
-def _rotation(pose: Sim3 | None) -> FloatArray:
-    assert pose is not None
-    return pose.rotation

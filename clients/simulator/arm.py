@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from clients.simulator.world import World
-from core.scan import look_at
+from core.camera_poses import angles_about_deg, look_at
 from core.sim3 import rotation_angle_deg
 from core.views import Burst, FloatArray, View
 
@@ -179,6 +179,4 @@ def _turned(world_from_camera: FloatArray, center_m: FloatArray, turn_deg: float
 
 def _angle_deg(first: FloatArray, second: FloatArray, center_m: FloatArray) -> float:
     """Between the directions from which two poses, each of shape (4, 4), look at a point."""
-    one, other = first[:3, 3] - center_m, second[:3, 3] - center_m
-    cosine = one @ other / max(float(np.linalg.norm(one) * np.linalg.norm(other)), 1e-12)
-    return float(np.degrees(np.arccos(np.clip(cosine, -1, 1))))
+    return float(angles_about_deg(first[None, :3, 3], second[None, :3, 3], center_m)[0, 0])

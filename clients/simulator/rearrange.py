@@ -25,7 +25,7 @@ from clients.simulator.raycast.model import Model
 from clients.simulator.raycast.sensor import SensorConfig
 from clients.simulator.raycast.world import CENTER_M, RaycastWorld, standing
 from clients.simulator.scanning import COULD_NOT, learn_from_scan
-from core.scan import look_at
+from core.camera_poses import look_at
 from core.sim3 import Sim3, rotation_angle_deg
 from core.views import FloatArray
 

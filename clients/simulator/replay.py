@@ -9,7 +9,7 @@ import numpy as np
 from clients.datasets.folders import Sequence, load_burst
 from clients.datasets.viewpoints import aim_point, spread
 from clients.simulator.world import WorldObject
-from core.scan import nearest_view
+from core.camera_poses import nearest_view
 from core.views import Burst, FloatArray, View
 
 

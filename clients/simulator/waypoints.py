@@ -15,7 +15,8 @@ from clients.errors import ServiceProblem
 from clients.pose_error import PoseError
 from clients.robot import Observation, RobotClient
 from clients.simulator.arm import Arm
-from core.scan import infer_up, standoff_m, waypoints
+from core.camera_poses import waypoints
+from core.scan import infer_up, standoff_m
 from core.views import Burst
 
 

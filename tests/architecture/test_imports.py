@@ -62,9 +62,9 @@ FILE_CALLS = {
 }
 FILE_ATTRIBUTES = {("np", "load"), ("np", "save"), ("torch", "load"), ("torch", "save"), ("json", "load"), ("json", "dump")}
 WEIGHTS = ROOT / "core" / "backbones"
+"""Reads weights, which come from a cache, and their statistics."""
 STATISTICS = (ROOT / "core" / "calibration.py", ROOT / "core" / "confidence.py")
-"""Read the figures that ship."""
-"""The only place of core/ that touches files: weights come from a cache."""
+"""Read the figures that ship. Nothing else in core/ touches files."""
 
 Import = tuple[str, bool]
 """The imported module, and whether it is imported at module level."""

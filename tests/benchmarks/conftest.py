@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 import pytest
 
-from core.scan import hemisphere
+from core.camera_poses import hemisphere
 from core.sim3 import Sim3
 
 HALF_AXES = np.array([0.5, 0.35, 0.25]) / np.linalg.norm([1.0, 0.7, 0.5])

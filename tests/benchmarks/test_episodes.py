@@ -75,6 +75,13 @@ def test_repeats_are_counted_apart() -> None:
     assert counts.repeat_errors.tolist() == [[0, 2]]  # nothing exceeds 2, not even a burst's similarity to itself
 
 
+def test_a_similarity_of_the_threshold_itself_is_not_above_it_however_often_a_burst_was_met() -> None:
+    tenth = float(np.float32(0.1))  # three of them in single precision are more than three tenths
+    alike = np.where(TWO_KINDS == 0.1, tenth, TWO_KINDS)
+    counts = episode(pairs_of(alike), LABELS, [0, 0, 0, 3], np.array([tenth]))
+    assert counts.categories.tolist() == [[1, 1, 1, 2]]
+
+
 def test_the_memory_s_growth_stands_beside_the_truth() -> None:
     counts = episode(pairs_of(TWO_KINDS), LABELS, [0, 1, 2, 3], np.array([0.5, 0.9]))
     assert counts.categories.tolist() == [[1, 1, 2, 2], [1, 2, 3, 4]]

@@ -11,7 +11,7 @@ import pytest
 
 from benchmarks import parallel, pose
 from benchmarks.contenders import Sweep
-from core.scan import hemisphere
+from core.camera_poses import hemisphere
 from core.sim3 import Sim3
 
 from ..clients.datasets.co3d_format import label, write_annotations, write_sequence

@@ -7,7 +7,7 @@ import pytest
 
 from clients.simulator.arm import FREE, UP, Arm, ArmConfig, Limits
 from clients.simulator.world import WorldObject
-from core.scan import hemisphere, look_at
+from core.camera_poses import hemisphere, look_at
 from core.views import Camera, FloatArray, View
 
 CENTER_M = np.array([0.0, 0.0, 0.08])

@@ -13,9 +13,9 @@ from typer.testing import CliRunner, Result
 from clients.cli import app
 from core import backbones
 from core.backbones.base import Backbone
+from core.camera_poses import look_at
 from core.encode import Encoder
 from core.reference import build_reference
-from core.scan import look_at
 from core.sim3 import Sim3
 from core.views import Burst
 from store.memory import Memory

@@ -8,7 +8,7 @@ import pytest
 from clients.datasets.folders import Sequence, load_burst
 from clients.datasets.viewpoints import aim_point, spread
 from clients.simulator.replay import ReplayWorld
-from core.scan import hemisphere
+from core.camera_poses import hemisphere
 from core.views import Camera
 
 K = np.array([[100.0, 0, 50], [0, 100, 50], [0, 0, 1]])

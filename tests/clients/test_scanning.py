@@ -12,7 +12,7 @@ from clients.errors import InvalidInputProblem, TooFewViewsProblem
 from clients.robot import Scan
 from clients.simulator.arm import UP, Arm, ArmConfig, Limits
 from clients.simulator.scanning import MOST_AGAIN, REPLACEMENTS, ScanFailed, ScanReport, carry_out
-from core.scan import hemisphere
+from core.camera_poses import hemisphere
 from core.views import View
 
 from .test_arm import CENTER_M, EmptyWorld

@@ -26,7 +26,7 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 from conftest import ColourBackbone, Ellipsoid  # noqa: E402
 from fastapi.testclient import TestClient  # noqa: E402
 
-from core.scan import hemisphere  # noqa: E402
+from core.camera_poses import hemisphere  # noqa: E402
 from core.sim3 import Sim3  # noqa: E402
 from service.app import create_app  # noqa: E402
 from service.settings import Settings  # noqa: E402

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from core.camera_poses import hemisphere
 from core.crop import Window
 from core.encode import EncodedBurst, EncodedView
 from core.reference import Reference, build_reference
-from core.scan import hemisphere
 from core.sim3 import Sim3
 from core.views import Camera
 

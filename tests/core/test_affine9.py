@@ -38,12 +38,6 @@ def error(transform: Affine9, source: np.ndarray, target: np.ndarray) -> float:
 
 
 @given(transforms())
-def test_inverse_undoes(transform: Affine9) -> None:
-    assert np.allclose(transform.apply_inverse(transform.apply(POINTS)), POINTS, atol=1e-9)
-    assert np.allclose(transform.apply(transform.apply_inverse(POINTS)), POINTS, atol=1e-9)
-
-
-@given(transforms())
 def test_the_matrix_acts_as_the_transform(transform: Affine9) -> None:
     assert np.allclose(POINTS @ transform.as_matrix()[:3, :3].T + transform.as_matrix()[:3, 3], transform.apply(POINTS))
 
@@ -57,7 +51,6 @@ def test_similarities_act_one_after_the_other(transform: Affine9, first: Sim3, s
 @given(transforms())
 def test_identity_is_neutral(transform: Affine9) -> None:
     assert same(transform.then(Sim3.identity()), transform)
-    assert np.array_equal(Affine9.identity().apply(POINTS), POINTS)
 
 
 @given(similarities())

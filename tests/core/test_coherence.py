@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from core.camera_poses import hemisphere
 from core.coherence import incoherent, require_one_unit
 from core.encode import Encoder
 from core.errors import InvalidInput
-from core.scan import hemisphere
 from core.sim3 import Sim3
 from core.views import Burst, Camera
 

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from core.camera_poses import angles_about_deg
 from core.encode import EncodedBurst
 from core.errors import InvalidInput
 from core.next_view import LOOKED_DEG, Candidate, next_viewpoints
-from core.scan import angles_about_deg
 from core.sim3 import Sim3
 
 from .conftest import PaintedObject
@@ -45,10 +45,11 @@ def test_the_differing_side_is_looked_at(painted: PaintedObject, moved: Sim3, se
 def test_viewpoints_are_apart_from_each_other_and_from_what_was_seen(painted: PaintedObject, moved: Sim3, seen: EncodedBurst) -> None:
     poses = next_viewpoints(seen, [Candidate(painted.reference(6), moved)], None)
     center = np.median(seen.cloud_m, axis=0)
-    between = angles_about_deg(poses, poses, center)[~np.eye(len(poses), dtype=bool)]
+    places = poses[:, :3, 3]
+    between = angles_about_deg(places, places, center)[~np.eye(len(poses), dtype=bool)]
     assert (between > LOOKED_DEG).all()
-    looked = np.stack([view.camera.world_from_camera for view in seen.views if view.camera])
-    assert (angles_about_deg(poses, looked, center).min(axis=1) > LOOKED_DEG).all()
+    looked = np.stack([view.camera.world_from_camera[:3, 3] for view in seen.views if view.camera])
+    assert (angles_about_deg(places, looked, center).min(axis=1) > LOOKED_DEG).all()
 
 
 def test_a_burst_without_cameras_has_none(seen: EncodedBurst) -> None:

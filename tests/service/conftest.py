@@ -14,7 +14,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from core.backbones.base import Backbone
-from core.scan import hemisphere
+from core.camera_poses import hemisphere
 from core.sim3 import Sim3
 from core.views import Burst
 from service.app import create_app

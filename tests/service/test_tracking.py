@@ -15,7 +15,7 @@ from fastapi.testclient import TestClient
 from scipy.spatial.transform import Rotation
 from starlette.websockets import WebSocketDisconnect
 
-from core.scan import hemisphere
+from core.camera_poses import hemisphere
 from core.sim3 import Sim3, rotation_angle_deg
 from core.warm import WarmConfig
 from service import tracker

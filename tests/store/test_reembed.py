@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from core.backbones.base import Backbone
+from core.camera_poses import look_at
 from core.encode import EncodedBurst, Encoder
 from core.errors import Conflict, Unavailable
 from core.novelty import DecisionConfig, decide
 from core.packing import burst_as_arrays
 from core.reference import build_reference
-from core.scan import look_at
 from core.sim3 import Sim3
 from core.views import Burst
 from store.memory import Memory

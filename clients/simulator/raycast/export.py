@@ -15,8 +15,8 @@ from clients.simulator.raycast.model import Model
 from clients.simulator.raycast.sensor import SensorConfig
 from clients.simulator.raycast.world import UP, RaycastWorld
 from clients.simulator.world import WorldObject
+from core.camera_poses import look_at
 from core.errors import InvalidInput
-from core.scan import look_at
 from core.views import FloatArray, View
 
 DEPTH_UNIT_MM = 0.5

@@ -14,7 +14,7 @@ from clients.simulator.raycast.render import LitScene
 from clients.simulator.raycast.room import Room, make_room
 from clients.simulator.raycast.sensor import Sensor, SensorConfig
 from clients.simulator.world import WorldObject
-from core.scan import hemisphere
+from core.camera_poses import hemisphere
 from core.sim3 import Sim3
 from core.views import FloatArray, View
 

@@ -13,7 +13,7 @@ import pytest
 from numpy.typing import NDArray
 
 from clients.datasets.folders import Sequence, load_burst
-from core.scan import look_at
+from core.camera_poses import look_at
 from core.views import Camera
 
 SIZE = (48, 64)

@@ -10,7 +10,7 @@ import pytest
 from clients.simulator.raycast.model import Model
 from clients.simulator.raycast.sensor import SensorConfig, _hidden
 from clients.simulator.raycast.world import UP, RaycastWorld, standing
-from core.scan import look_at
+from core.camera_poses import look_at
 from core.views import FloatArray, View
 
 BOX_M = np.array([0.2, 0.12, 0.1])

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.scan import ScanRequest, coverage, hemisphere
+from core.camera_poses import hemisphere
+from core.scan import ScanRequest, coverage
 from service.console.hemisphere import CENTRE, HEIGHT, RADIUS, WIDTH, hemisphere_of
 
 
