@@ -1,4 +1,7 @@
-"""Robust estimators by name. To add one, add a file here that offers an `Estimator` (`core.estimators.base` says what that is)."""
+"""Robust estimators by name. To add one, add a file here that offers an `Estimator` (`core.estimators.base` says what that is).
+
+For those of one's own, `ransac` has random samples with their inliers and the refitting of a winner, `batched` many transforms at once.
+"""
 
 from __future__ import annotations
 
