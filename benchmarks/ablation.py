@@ -6,7 +6,7 @@ The last row picks, among the hypotheses that `best` refined, the one nearest th
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +14,7 @@ import numpy as np
 from benchmarks.pair_jobs import PairJob, pair_jobs
 from benchmarks.pairs import ViewCounts
 from benchmarks.parallel import map_jobs
-from benchmarks.tables import print_table, write_json
+from benchmarks.tables import report
 from core.backbones import load_backbone
 from core.encode import Encoder
 from core.errors import NoPose
@@ -64,10 +64,8 @@ def run(data: Path, views: Sequence[str], limit: int, json: Path | None, seed: i
         for count in dict.fromkeys(job.views for job in jobs)
         for change in CHANGES
     ]
-    if json is not None:
-        meta = {"benchmark": "ablation", "data": data, "limit": limit, "seed": seed, "fingerprint": network.fingerprint}
-        write_json(json, meta, [asdict(row) for row in rows])
-    print_table(f"Ablation of best, {data}", [asdict(row) for row in rows], list(AblationRow.__dataclass_fields__))
+    meta = {"benchmark": "ablation", "data": data, "limit": limit, "seed": seed, "fingerprint": network.fingerprint}
+    report(f"Ablation of best, {data}", rows, meta, json)
     return rows
 
 

@@ -15,11 +15,11 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 from numpy.typing import NDArray
-from rich.progress import track
 
 from benchmarks.agreements import agreements
 from benchmarks.encoded import encode_all, read_views
 from benchmarks.matches import matches
+from benchmarks.parallel import bar
 from clients.datasets.folders import find_sequences
 from core.backbones import load_backbone
 from core.calibration import SHIPPED
@@ -34,7 +34,8 @@ def main(data: Annotated[Path, typer.Option(help="folder of bursts")], out: Anno
     backbone = load_backbone(report=typer.echo)
     sequences = find_sequences(data)
     files = encode_all(sequences, Encoder(backbone))
-    bursts = [read_views(file) for file in track(files, "reading")]
+    with bar() as progress:
+        bursts = [read_views(file) for file in progress.track(files, description="reading")]
     labels = np.unique([sequence.category for sequence in sequences], return_inverse=True)[1]
     match, agreement = matches(bursts, backbone.whitening)[0], agreements(files, backbone.whitening)
     typer.echo(f"wrote {write(out, backbone.fingerprint, labels, match, agreement)}")

@@ -17,7 +17,7 @@ from benchmarks.encoded import encode_all, read_views
 from benchmarks.growth_plot import plot_growth
 from benchmarks.parallel import bar
 from benchmarks.synthetic_tokens import Levels, SyntheticTokens
-from benchmarks.tables import print_table, write_json
+from benchmarks.tables import print_table, report
 from clients.datasets.samples import data_or_samples
 from clients.datasets.sources import find_sequences
 from core.backbones import EMBEDDED, load_backbone
@@ -84,7 +84,6 @@ class GrowthRow:
     """Standard deviation of the exact similarities, to compare with."""
 
 
-COLUMNS = tuple(field.name for field in fields(GrowthRow))
 Fill = Callable[[Path, Iterable[EncodedBurst]], None]
 """Adds a category for each burst to the memory in a folder, which is made where it is missing."""
 Measure = Callable[[Probe], GrowthRow]
@@ -125,13 +124,12 @@ def run(
             asked = [tokens.burst(category, ASKED, views) for category in right]
             rows.append(measure(Probe(Path(folder), asked, right, tokens.burst(10**9 + count, ASKED, views), rounds, count <= exact_up_to)))
             before = count
-    if json is not None:
-        meta = {"benchmark": "growth", "views": views, "rounds": rounds, "seed": seed}
-        write_json(json, meta | {"recorded": asdict(recorded), "synthetic": asdict(synthetic)}, [asdict(row) for row in rows])
     if plot is not None:
         plot_growth(plot, rows, f"{views} views a burst, one burst a category")
-    print_table("How well bursts match", [{"bursts": "recorded", **asdict(recorded)}, {"bursts": "synthetic", **asdict(synthetic)}], LEVELS)
-    print_table(f"Growth, {views} views a burst, {rounds} decisions", [asdict(row) for row in rows], COLUMNS)
+    meta = {"benchmark": "growth", "views": views, "rounds": rounds, "seed": seed}
+    match = {"recorded": asdict(recorded), "synthetic": asdict(synthetic)}
+    print_table("How well bursts match", [{"bursts": bursts, **levels} for bursts, levels in match.items()], LEVELS)
+    report(f"Growth, {views} views a burst, {rounds} decisions", rows, meta | match, json)
     return rows
 
 

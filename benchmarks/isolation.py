@@ -6,7 +6,7 @@ The found foreground is what the product uses: the patches of the close crop aft
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import dataclass, replace
 from itertools import groupby
 from pathlib import Path
 
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.encoded import encode_all, read_encoded
-from benchmarks.tables import print_table, write_json
+from benchmarks.tables import report
 from clients.datasets import folders
 from clients.datasets.sources import find_sequences
 from core.backbones import EMBEDDED, load_backbone
@@ -44,7 +44,6 @@ class IsolationRow:
     """Percentage of views in which less than a tenth of the object was found."""
 
 
-COLUMNS = tuple(field.name for field in fields(IsolationRow))
 MEAN_COLUMNS = ("iou", "precision", "recall", "missed")
 MISSED_RECALL = 0.1
 
@@ -72,10 +71,8 @@ def run(
         rows += table_rows(
             source, [(sequence.category, score) for sequence, file in zip(sequences, files) for score in _scores(sequence, file)]
         )
-    if json is not None:
-        meta = {"benchmark": "isolation", "data": data, "limit": limit, "backbone": network.name, "fingerprint": network.fingerprint}
-        write_json(json, meta, [asdict(row) for row in rows])
-    print_table(f"Isolation, {data}", [asdict(row) for row in rows], COLUMNS)
+    meta = {"benchmark": "isolation", "data": data, "limit": limit, "backbone": network.name, "fingerprint": network.fingerprint}
+    report(f"Isolation, {data}", rows, meta, json)
     return rows
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Sequence
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -14,7 +14,7 @@ import numpy as np
 from benchmarks.crowd import Errand, Record, crowd, require_loopback
 from benchmarks.load_plot import plot_load
 from benchmarks.parallel import bar
-from benchmarks.tables import print_table, write_json
+from benchmarks.tables import report
 from clients.asynchronous import AsyncRobotClient
 from clients.datasets import folders
 from clients.datasets.samples import data_or_samples
@@ -53,9 +53,6 @@ class LoadRow:
     """Processor time of the service's process for an answer; on a cluster, of the memory's owner alone."""
 
 
-COLUMNS = tuple(field.name for field in fields(LoadRow))
-
-
 def run(
     json: Path | None,
     plot: Path | None = None,
@@ -79,11 +76,10 @@ def run(
         teach(url, sequences)
         errand = observing([folders.load_burst(each, range(views)) for each in sequences])
         rows = [load_row(count, seconds, record) for count, record in _levels(url, robots, seconds, errand, seed)]
-    if json is not None:
-        write_json(json, {"benchmark": "load", "seconds": seconds, "views": views, "seed": seed}, [asdict(row) for row in rows])
     if plot is not None:
         plot_load(plot, rows, f"{views} views an observation, {seconds:.0f} s each")
-    print_table(f"Load, {views} views an observation, {seconds:.0f} s each", [asdict(row) for row in rows], COLUMNS)
+    meta = {"benchmark": "load", "seconds": seconds, "views": views, "seed": seed}
+    report(f"Load, {views} views an observation, {seconds:.0f} s each", rows, meta, json)
     return rows
 
 

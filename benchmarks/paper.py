@@ -7,12 +7,12 @@ What can be compared is what one step changes within a column.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 
 from benchmarks.contenders import Sweep
 from benchmarks.pose import PoseRow, measure
-from benchmarks.tables import print_table, write_json
+from benchmarks.tables import report
 from core.backbones import EMBEDDED
 
 FEW, ALL = "10", "all"
@@ -91,7 +91,6 @@ class PaperRow:
     memory_mb: float | None
 
 
-COLUMNS = tuple(field.name for field in fields(PaperRow))
 TAKEN = ("variant", "views", "pairs", "median_deg", "acc30", "acc15", "acc7_5", "solve_ms", "memory_mb")
 """Of ours."""
 
@@ -100,9 +99,7 @@ def run(data: Path, limit: int | None, json: Path | None, seed: int = 0, backbon
     """Measures every row of both tables on `data`; prints and returns them beside the published ones. See `benchmarks.pose.run`."""
     measured, meta = measure(data, SWEEPS, limit, seed, backbone)
     rows = beside([row for row in measured if row.category == "all"])
-    if json is not None:
-        write_json(json, {**meta, "benchmark": "paper"}, [asdict(row) for row in rows])
-    print_table(f"The paper's tables; ours on {data}, other data and another backbone", [asdict(row) for row in rows], COLUMNS)
+    report(f"The paper's tables; ours on {data}, other data and another backbone", rows, {**meta, "benchmark": "paper"}, json)
     return rows
 
 

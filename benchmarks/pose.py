@@ -22,7 +22,7 @@ from benchmarks.encoded import read_views
 from benchmarks.pair_jobs import encode_pairs, seen_views
 from benchmarks.pairs import Pair, ViewCounts, sample_pairs
 from benchmarks.parallel import map_jobs, worker_count
-from benchmarks.tables import print_table, write_json
+from benchmarks.tables import report
 from clients.datasets import folders
 from clients.datasets.sources import find_sequences
 from clients.pose_error import NO_POSE, PoseError, accuracy, median, pose_error, rotation_error_deg
@@ -121,11 +121,9 @@ def run(data: Path, sweep: Sweep, limit: int | None, json: Path | None, seed: in
     Raises InvalidInput for a setting that does not exist, or data without pairs, ground truth or enough views.
     """
     rows, meta = measure(data, [sweep], limit, seed, backbone)
-    if json is not None:
-        write_json(json, meta, [asdict(row) for row in rows])
     differing = [name for name in OPTIONS if len({(row.variant, getattr(row, name)) for row in rows}) > len(set(sweep.variants))]
     hidden = {*OPTIONS, *(name for name in TRANSLATION if all(getattr(row, name) is None for row in rows))}
-    print_table(f"Pose, {data}", [asdict(row) for row in rows], [*(name for name in COLUMNS if name not in hidden), *differing])
+    report(f"Pose, {data}", rows, meta, json, [*(name for name in COLUMNS if name not in hidden), *differing])
     return rows
 
 

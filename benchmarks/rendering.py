@@ -5,13 +5,13 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass, fields
 from pathlib import Path
 
 import numpy as np
 
 from benchmarks.parallel import bar
-from benchmarks.tables import print_table, write_json
+from benchmarks.tables import report
 from clients.simulator.raycast.export import draw_models
 from clients.simulator.raycast.model import Model
 from clients.simulator.raycast.sensor import SensorConfig
@@ -52,10 +52,8 @@ def run(json: Path | None, categories: Sequence[str], frames: int = 12, seed: in
     values = [[getattr(row, name) for name in COLUMNS[1:]] for row in rows]
     triangles, *means = np.mean(values, axis=0).tolist()
     rows.append(RenderingRow("all", round(triangles), *means))
-    if json is not None:
-        meta = {"benchmark": "rendering", "frames": frames, "seed": seed, "size": list(SensorConfig().size), "cores": os.cpu_count()}
-        write_json(json, meta, [asdict(row) for row in rows])
-    print_table(f"Rendering, {frames} frames of each object", [asdict(row) for row in rows], COLUMNS)
+    meta = {"benchmark": "rendering", "frames": frames, "seed": seed, "size": list(SensorConfig().size), "cores": os.cpu_count()}
+    report(f"Rendering, {frames} frames of each object", rows, meta, json)
     return rows
 
 

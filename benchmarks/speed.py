@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from io import BytesIO
 from pathlib import Path
@@ -18,7 +18,7 @@ import torch
 
 from benchmarks import speed_plot, zero_shot_pose
 from benchmarks.parallel import bar
-from benchmarks.tables import print_table, write_json
+from benchmarks.tables import print_table, report
 from clients.datasets import folders
 from clients.datasets.samples import data_or_samples
 from clients.datasets.sources import find_sequences
@@ -73,7 +73,6 @@ PRODUCTS = "products of all patches"
 RECIPE = "solve as zero-shot-pose does"
 GROWING = ("ucd", "best")
 MORE = 3
-COLUMNS = tuple(field.name for field in fields(SpeedRow))
 
 
 def run(
@@ -115,21 +114,20 @@ def run(
         RECIPE: partial(_without_stages, zero_shot_pose.solve, whole, threshold_m, 0),
     }
     rows = table_rows(_rounds(operations, rounds), OBSERVATION)
-    targets = target_rows(rows, _megabytes(reference))
-    if json is not None:
-        meta = {
-            "benchmark": "speed",
-            "views": views,
-            "rounds": rounds,
-            "backbone": network.name,
-            "device": device,
-            "threads": torch.get_num_threads(),
-        }
-        write_json(json, meta | {"targets": [asdict(row) for row in targets]}, [asdict(row) for row in rows])
+    targets = [asdict(row) for row in target_rows(rows, _megabytes(reference))]
     if plot is not None:
         speed_plot.plot(plot, _waterfall(rows), f"{views} views against a reference of {views}, {torch.get_num_threads()} threads")
-    print_table(f"Speed, {views} + {views} views, {torch.get_num_threads()} threads", [asdict(row) for row in rows], COLUMNS)
-    print_table("Against its bounds", [asdict(row) for row in targets], ("target", "measured", "bound"))
+    meta = {
+        "benchmark": "speed",
+        "views": views,
+        "rounds": rounds,
+        "backbone": network.name,
+        "device": device,
+        "threads": torch.get_num_threads(),
+        "targets": targets,
+    }
+    report(f"Speed, {views} + {views} views, {torch.get_num_threads()} threads", rows, meta, json)
+    print_table("Against its bounds", targets, ("target", "measured", "bound"))
     return rows
 
 

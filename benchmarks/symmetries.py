@@ -6,15 +6,15 @@ A false claim is worse than a miss: it calls different poses the same.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass, fields
 from itertools import groupby
 from pathlib import Path
 
 import numpy as np
-from rich.progress import track
 
 from benchmarks.encoded import encode_all, read_encoded, read_views
-from benchmarks.tables import print_table, write_json
+from benchmarks.parallel import bar
+from benchmarks.tables import report
 from clients.datasets import folders
 from clients.datasets.sources import find_sequences
 from core.backbones import EMBEDDED, load_backbone
@@ -58,12 +58,12 @@ def run(data: Path, json: Path | None, views: int = 10, limit: int | None = None
         raise InvalidInput("data", f"no sequence below {data} has scene_gt.json, which declared symmetries need to be compared")
     network = load_backbone(backbone)
     files = encode_all(sequences, Encoder(network))
-    judged = [judge(sequence, _claimed(file, views)) for sequence, file in track(list(zip(sequences, files)), "symmetries", transient=True)]
+    with bar() as progress:
+        claimed = [_claimed(file, views) for file in progress.track(files, description="symmetries")]
+    judged = [judge(sequence, each) for sequence, each in zip(sequences, claimed, strict=True)]
     rows = table_rows(judged)
-    if json is not None:
-        meta = {"benchmark": "symmetries", "data": data, "views": views, "limit": limit, "fingerprint": network.fingerprint}
-        write_json(json, meta, [asdict(row) for row in rows])
-    print_table(f"Symmetries, {data}", [asdict(row) for row in rows], COLUMNS)
+    meta = {"benchmark": "symmetries", "data": data, "views": views, "limit": limit, "fingerprint": network.fingerprint}
+    report(f"Symmetries, {data}", rows, meta, json)
     return rows
 
 

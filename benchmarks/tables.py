@@ -7,13 +7,18 @@ import math
 import os
 import platform
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from rich import box
 from rich.console import Console
 from rich.table import Table
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
 
 Row = Mapping[str, object]
 Meta = Mapping[str, object]
@@ -31,6 +36,14 @@ def machine() -> dict[str, object]:
         "processor": _processor(),
         "cores": os.cpu_count(),
     }
+
+
+def report(title: str, rows: Sequence[DataclassInstance], meta: Meta, json: Path | None, columns: Sequence[str] | None = None) -> None:
+    """The end of a benchmark: its rows as a table, and in the file `json` where one is named; every column where `columns` is left out."""
+    told = [asdict(row) for row in rows]
+    if json is not None:
+        write_json(json, meta, told)
+    print_table(title, told, columns or list(told[0]))
 
 
 def print_table(title: str, rows: Sequence[Row], columns: Sequence[str]) -> None:

@@ -11,8 +11,8 @@ from typing import Annotated
 
 import numpy as np
 import typer
-from rich.progress import track
 
+from benchmarks.parallel import bar
 from clients.datasets.folders import load_burst
 from clients.datasets.sources import find_sequences
 from core.backbones import EMBEDDED, load_backbone
@@ -32,13 +32,14 @@ def main(
     encoder = Encoder(network)
     rng = np.random.default_rng(0)
     tokens = []
-    for sequence in track(find_sequences(data), "encoding"):
-        burst = load_burst(sequence)
-        windows = [view.window for view in encoder.encode(burst).views]
-        side = encoder.config.grid * network.patch_size
-        crops = np.stack([window.cut(view.rgb, side) for view, window in zip(burst.views, windows)])
-        patches = network.extract(crops).patches.reshape(len(crops), -1, network.dim)
-        tokens += [view[rng.permutation(len(view))[:PATCHES_A_VIEW]] for view in patches]
+    side = encoder.config.grid * network.patch_size
+    with bar() as progress:
+        for sequence in progress.track(find_sequences(data), description="encoding"):
+            burst = load_burst(sequence)
+            windows = [view.window for view in encoder.encode(burst).views]
+            crops = np.stack([window.cut(view.rgb, side) for view, window in zip(burst.views, windows)])
+            patches = network.extract(crops).patches.reshape(len(crops), -1, network.dim)
+            tokens += [view[rng.permutation(len(view))[:PATCHES_A_VIEW]] for view in patches]
     typer.echo(f"wrote {Whitening.fit(np.concatenate(tokens)).save(network.name, out)}")
 
 

@@ -12,7 +12,7 @@ import json as json_
 import time
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -20,7 +20,7 @@ import numpy as np
 from websockets.asyncio.client import ClientConnection, connect
 
 from benchmarks.parallel import bar
-from benchmarks.tables import print_table, write_json
+from benchmarks.tables import report
 from clients.datasets import folders
 from clients.datasets.samples import data_or_samples
 from clients.datasets.sources import find_sequences
@@ -56,9 +56,6 @@ class TrackRow:
     dropped: int
     posed: float
     """Share of answers with a pose that the frame itself gave."""
-
-
-COLUMNS = tuple(field.name for field in fields(TrackRow))
 
 
 @dataclass
@@ -113,9 +110,8 @@ def run(
                 category_id = _teach(url, taught)
                 stream = asyncio.run(_follow(url, category_id, frames, rate_hz, seconds))
             rows.append(stream.row(grid * PATCH_PX, warm))
-    if json is not None:
-        write_json(json, {"benchmark": "track", "rate_hz": rate_hz, "seconds": seconds}, [asdict(row) for row in rows])
-    print_table(f"Tracking, a camera at {rate_hz:.0f} Hz, {seconds:.0f} s each", [asdict(row) for row in rows], COLUMNS)
+    meta = {"benchmark": "track", "rate_hz": rate_hz, "seconds": seconds}
+    report(f"Tracking, a camera at {rate_hz:.0f} Hz, {seconds:.0f} s each", rows, meta, json)
     return rows
 
 

@@ -41,8 +41,8 @@ class Pose:
 
     target_from_reference: Sim3
     """From the world frame of the reference scan to the world frame of the burst, metres both."""
-    object_in_world: FloatArray
-    """Rigid `world_from_object`, shape (4, 4): the object's box, its centre and axes, in the burst's world frame, metres."""
+    world_from_object: FloatArray
+    """Rigid, shape (4, 4): the object's box, its centre and axes, in the burst's world frame, metres."""
     extent_m: FloatArray
     """Edge lengths of the box along the object's axes, shape (3,), metres."""
     corners_m: FloatArray

@@ -25,7 +25,7 @@ def bop_lines(pose: Pose, cameras: Sequence[Camera], images: Sequence[Path], sce
     score = next((value for value in (pose.confidence, pose.score) if value is not None), 0.0)
     lines = []
     for place, (camera, image) in enumerate(zip(cameras, images, strict=True)):
-        camera_from_object = camera.camera_from_world @ pose.object_in_world
+        camera_from_object = camera.camera_from_world @ pose.world_from_object
         rotation = " ".join(f"{value:.9g}" for value in np.ravel(camera_from_object[:3, :3]))
         translation = " ".join(f"{1000 * value:.9g}" for value in camera_from_object[:3, 3])
         number = number_of(image.stem, place)

@@ -52,8 +52,8 @@ class Plan:
     """That the anchor moves."""
     symmetric: bool
     """Whether it ends turned by one of its symmetries."""
-    object_in_world: FloatArray
-    """Rigid `world_from_object` once it is there, shape (4, 4), metres."""
+    world_from_object: FloatArray
+    """Rigid, shape (4, 4), metres: the object's box once it is there."""
 
     @staticmethod
     def from_json(fields: Mapping[str, Any]) -> Plan:

@@ -29,8 +29,8 @@ class TrackedPose:
 
     target_from_reference: Sim3
     """From the world frame of the reference scan to the frames' world, metres both."""
-    object_in_world: FloatArray
-    """Rigid `world_from_object`, shape (4, 4), metres."""
+    world_from_object: FloatArray
+    """Rigid, shape (4, 4), metres: the object's box."""
     extent_m: FloatArray
     """Edge lengths of its box, shape (3,)."""
     corners_m: FloatArray

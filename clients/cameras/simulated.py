@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from clients.datasets.sources import find_sequences
+from clients.datasets.sources import only_sequence
 from clients.simulator.replay import ReplayWorld
 from clients.simulator.world import World
-from core.errors import InvalidInput
 from core.views import FloatArray, View
 
 
@@ -28,7 +27,4 @@ def recorded(data: Path | str) -> WorldCamera:
 
     Raises InvalidInput where `data` (see `sources.find_sequences`) holds several objects, or views without cameras.
     """
-    sequences = find_sequences(data)
-    if len(sequences) > 1:
-        raise InvalidInput("data", f"{data} holds {len(sequences)} objects; name one, such as {sequences[0].path}")
-    return WorldCamera(ReplayWorld(sequences[0]))
+    return WorldCamera(ReplayWorld(only_sequence(data)))

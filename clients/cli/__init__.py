@@ -11,7 +11,7 @@ import typer
 from rich.markup import escape
 from typer.core import TyperGroup
 
-from clients.cli import bench, categories, data, demo, doctor, keys, memory, rearrange, render, robot, service
+from clients.cli import bench, categories, doctor, keys, memory, rearrange, recordings, render, robot, service, simulate
 from clients.cli.terminal import errors
 from core.errors import OneLookError
 
@@ -55,11 +55,11 @@ app.command("scan")(robot.scan)
 app.add_typer(categories.app, name="categories")
 app.add_typer(memory.app, name="memory")
 app.add_typer(keys.app, name="keys")
-app.command("simulate")(demo.simulate)
+app.command("simulate")(simulate.simulate)
 app.command("rearrange")(rearrange.rearrange)
 app.command("render")(render.render)
-app.command("samples")(data.samples)
-app.command("convert")(data.convert)
+app.command("samples")(recordings.samples)
+app.command("convert")(recordings.convert)
 app.add_typer(bench.app, name="bench")
 
 

@@ -44,7 +44,14 @@ def pose(
     from benchmarks.contenders import Sweep
     from benchmarks.pose import run
 
-    run(data, Sweep(variant, views, dims, method, consensus, inlier, estimator, dof), limit, json, seed, backbone)
+    run(
+        data=data,
+        sweep=Sweep(variant, views, dims, method, consensus, inlier, estimator, dof),
+        limit=limit,
+        json=json,
+        seed=seed,
+        backbone=backbone,
+    )
 
 
 @app.command()
@@ -59,7 +66,7 @@ def ablation(
     """What each part of the variant best adds to its accuracy."""
     from benchmarks.ablation import run
 
-    run(data, views, limit, json, seed, backbone)
+    run(data=data, views=views, limit=limit, json=json, seed=seed, backbone=backbone)
 
 
 @app.command()
@@ -73,7 +80,7 @@ def paper(
     """The paper's tables 1 and 2, with every published row beside ours."""
     from benchmarks.paper import run
 
-    run(data, limit, json, seed, backbone)
+    run(data=data, limit=limit, json=json, seed=seed, backbone=backbone)
 
 
 @app.command()
@@ -91,7 +98,7 @@ def discovery(
     """How well known and novel objects are told apart."""
     from benchmarks.discovery import run
 
-    run(data, score or [], json, episodes, length, seed, backbone, plot, poses)
+    run(data=data, scores=score or [], json=json, episodes=episodes, length=length, seed=seed, backbone=backbone, picture=plot, poses=poses)
 
 
 @app.command()
@@ -107,7 +114,7 @@ def speed(
     """Time of every stage of an observation."""
     from benchmarks.speed import run
 
-    run(json, data, views, rounds, backbone, device, plot)
+    run(json=json, data=data, views=views, rounds=rounds, backbone=backbone, device=device, plot=plot)
 
 
 @app.command()
@@ -124,9 +131,21 @@ def growth(
 ) -> None:
     """Time of a decision, of a start, and memory, as a memory grows to many categories."""
     from benchmarks.growth import run
-    from clients.cli.grown import fill, measure
+    from clients.cli.bench_growth import fill, measure
 
-    run(fill, measure, json, plot, categories, views, rounds, exact_up_to, data, backbone, seed)
+    run(
+        fill=fill,
+        measure=measure,
+        json=json,
+        plot=plot,
+        categories=categories,
+        views=views,
+        rounds=rounds,
+        exact_up_to=exact_up_to,
+        data=data,
+        backbone=backbone,
+        seed=seed,
+    )
 
 
 @app.command()
@@ -139,9 +158,9 @@ def track(
 ) -> None:
     """Sustained rate, latency and dropped frames of a followed object, from the last pose and solved anew each time."""
     from benchmarks.track import run
-    from clients.cli.tracked import serve
+    from clients.cli.bench_track import serve
 
-    run(serve, json, grid, rate, seconds, data)
+    run(serve=serve, json=json, grids=grid, rate_hz=rate, seconds=seconds, data=data)
 
 
 @app.command()
@@ -154,7 +173,7 @@ def rendering(
     """Frames a second of the simulated world."""
     from benchmarks.rendering import run
 
-    run(json, category or [], frames, seed)
+    run(json=json, categories=category or [], frames=frames, seed=seed)
 
 
 @app.command("next-view")
@@ -170,7 +189,7 @@ def next_view(
     """Whether one more view, from where an uncertain answer says, settles it: in the simulated world."""
     from benchmarks.next_view import run
 
-    run(json, category or [], instances, looks, rate, seed, backbone)
+    run(json=json, categories=category or [], instances=instances, looks=looks, rate=rate, seed=seed, backbone=backbone)
 
 
 @app.command()
@@ -187,7 +206,7 @@ def load(
     """Throughput, times, queue, refusals and memory of a service that many robots ask at once."""
     from benchmarks.load import run
 
-    run(json, plot, robots, seconds, views, data, url, seed)
+    run(json=json, plot=plot, robots=robots, seconds=seconds, views=views, data=data, url=url, seed=seed)
 
 
 @app.command()
@@ -205,7 +224,7 @@ def soak(
     """Whether a service that works for long grows: resident memory, once settled and at the end."""
     from benchmarks.soak import run
 
-    run(minutes, most_growth, json, plot, robots, views, data, url, seed)
+    run(minutes=minutes, most_growth=most_growth, json=json, plot=plot, robots=robots, views=views, data=data, url=url, seed=seed)
 
 
 @app.command()
@@ -219,7 +238,7 @@ def isolation(
     """How well the object is told from its background, against silhouettes."""
     from benchmarks.isolation import SOURCES, run
 
-    run(data, json, source or SOURCES, limit, backbone)
+    run(data=data, json=json, sources=source or SOURCES, limit=limit, backbone=backbone)
 
 
 @app.command()
@@ -233,7 +252,7 @@ def symmetries(
     """Whether symmetric objects are recognised, against the symmetries that the data declare."""
     from benchmarks.symmetries import run
 
-    run(data, json, views, limit, backbone)
+    run(data=data, json=json, views=views, limit=limit, backbone=backbone)
 
 
 @app.command()
@@ -253,4 +272,16 @@ def robustness(
     """How much worse sensors and places may get; goes on where it was interrupted."""
     from benchmarks.robustness import run
 
-    run(data, json, plot, views, limit, degradation or [], category or [], strongest, seed, backbone, poses)
+    run(
+        data=data,
+        json=json,
+        picture=plot,
+        views=views,
+        limit=limit,
+        degradations=degradation or [],
+        categories=category or [],
+        strongest=strongest,
+        seed=seed,
+        backbone=backbone,
+        poses=poses,
+    )

@@ -9,7 +9,7 @@ from typing import Annotated, Protocol, TypeVar
 import typer
 
 from clients.answers import Category
-from clients.cli.terminal import URL, Json, Url, console, print_json, print_table
+from clients.cli.terminal import URL, Json, Url, console, print_json, print_table, when
 from clients.errors import ClientError
 from clients.robot import RobotClient
 
@@ -90,5 +90,5 @@ def _row(category: Category) -> dict[str, str]:
         "views": str(category.views),
         "instances": str(category.instances),
         "size": " × ".join(f"{100 * edge:.0f}" for edge in category.extent_m) + " cm",
-        "learnt": category.created_at[:19].replace("T", " "),
+        "learnt": when(category.created_at),
     }

@@ -166,10 +166,11 @@ def weights(settings: Settings) -> Finding:
 
 def memory(settings: Settings) -> Finding:
     """What was learnt, and whether this backbone can go on with it."""
+    from store.connection import DATABASE
     from store.memory import Memory
 
-    if not (settings.data_dir / "memory.sqlite3").exists():
-        place = _existing(settings.data_dir)
+    if not (settings.data_dir / DATABASE).exists():
+        place = _nearest_folder(settings.data_dir)
         if place.is_dir() and os.access(place, os.W_OK):
             return Finding("memory", State.good, f"none in {settings.data_dir} yet; the first start makes it")
         return Finding("memory", State.bad, f"{place} cannot be written", "name another folder with ONELOOK_DATA_DIR or --data-dir")
@@ -183,10 +184,11 @@ def memory(settings: Settings) -> Finding:
 
 def reach(settings: Settings) -> Finding:
     """Who can ask the service, and whether it asks them who they are."""
+    from store.connection import DATABASE
     from store.memory import Memory
 
     keys = 0
-    if (settings.data_dir / "memory.sqlite3").exists():
+    if (settings.data_dir / DATABASE).exists():
         with Memory.reading(settings.data_dir) as stored:
             keys = len(stored.keys.all())
     settings.require_safe(keys)
@@ -195,7 +197,7 @@ def reach(settings: Settings) -> Finding:
 
 def disk(settings: Settings) -> Finding:
     """Room for the memory to grow."""
-    free_gb = shutil.disk_usage(_existing(settings.data_dir)).free / 1e9
+    free_gb = shutil.disk_usage(_nearest_folder(settings.data_dir)).free / 1e9
     if free_gb >= LEAST_DISK_GB:
         return Finding("disk", State.good, f"{free_gb:.1f} GB free")
     remedy = "make room, keep fewer observations (ONELOOK_KEEP_OBSERVATIONS), or name a folder on another disk (ONELOOK_DATA_DIR)"
@@ -233,7 +235,7 @@ def _why_not(library: str) -> Exception | None:
     return None
 
 
-def _existing(path: Path) -> Path:
+def _nearest_folder(path: Path) -> Path:
     """The nearest folder above that is there."""
     return next(each for each in (path, *path.absolute().parents) if each.exists())
 

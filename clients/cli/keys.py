@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from clients.cli.memory import DataDir, folder_of
-from clients.cli.terminal import Json, console, errors, print_json, print_table
+from clients.cli.terminal import Json, console, errors, print_json, print_table, when
 
 if TYPE_CHECKING:
     from store.keys import Key
@@ -76,4 +76,4 @@ def revoke(
 
 
 def _row(key: Key) -> dict[str, str]:
-    return {"id": key.id, "name": key.name, "role": key.role, "made": key.created_at[:19].replace("T", " ")}
+    return {"id": key.id, "name": key.name, "role": key.role, "made": when(key.created_at)}

@@ -10,7 +10,7 @@ import typer
 
 from clients.cli.categories import find
 from clients.cli.service import read_settings
-from clients.cli.terminal import URL, Json, Url, console, errors, print_facts, print_json, print_table, progress_of
+from clients.cli.terminal import URL, Json, Url, console, errors, print_facts, print_json, print_table, progress_of, when
 from clients.robot import RobotClient
 
 if TYPE_CHECKING:
@@ -145,7 +145,7 @@ def reembed(
     from store.memory import Memory
 
     settings = read_settings({})
-    with Memory.open(_existing(data_dir)) as stored:
+    with Memory.open(_folder_with_memory(data_dir)) as stored:
         loaded = load_backbone(backbone or settings.backbone, device=device or settings.device, report=errors.print)
         with progress_of("computing") as progress:
             done = stored.reembed(
@@ -159,8 +159,8 @@ def reembed(
 
 def _row(category: dict[str, Any]) -> dict[str, str]:
     shown = {"id": category["id"][:8], "name": category["name"] or "–"}
-    learnt = category["created_at"][:19].replace("T", " ")
-    return shown | {"views": str(category["views"]), "instances": str(category["instances"]), "learnt": learnt}
+    counts = {name: str(category[name]) for name in ("views", "instances")}
+    return shown | counts | {"learnt": when(category["created_at"])}
 
 
 def folder_of(data_dir: Path | None) -> Path:
@@ -168,7 +168,7 @@ def folder_of(data_dir: Path | None) -> Path:
     return data_dir or read_settings({}).data_dir
 
 
-def _existing(data_dir: Path | None) -> Path:
+def _folder_with_memory(data_dir: Path | None) -> Path:
     """The same; raises NotFound where no memory is in it."""
     from store.memory import Memory
 

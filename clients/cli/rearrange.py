@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from clients.cli.demo import Out, ServiceUrl, service
+from clients.cli.simulate import Out, ServiceUrl, service
 from clients.cli.terminal import Json, console, errors, print_facts, print_json
 
 CATEGORIES = ["mug", "teapot", "car", "camera", "chair", "duck", "house", "locomotive", "clock", "laptop"]
@@ -28,9 +28,9 @@ def rearrange(
 ) -> None:
     """Show a reference at a goal, bring other objects of its category there, and measure how they end."""
     from clients.robot import RobotClient
+    from clients.simulator.journal import interrupted, kept
     from clients.simulator.raycast.export import draw_models
     from clients.simulator.rearrange import Rearrangement, Trial, summarise, write_json, write_picture
-    from clients.simulator.runner import interrupted
 
     categories = category or CATEGORIES
     draw_models(categories, 1, seed)  # says at once which category there is none of
@@ -39,13 +39,11 @@ def rearrange(
     settings: dict[str, object] = {"categories": categories, "trials": trials, "views": views, "seed": seed}
     lines = out / "rearrange.jsonl"
     done = [Trial(**jsonlib.loads(line)) for line in interrupted(lines, settings)] if resume else []
-    with service(url, out, fresh=not resume) as address, RobotClient(address) as robot, lines.open("w", encoding="utf-8") as file:
-        print(*(jsonlib.dumps(each) for each in (settings, *map(asdict, done))), sep="\n", file=file, flush=True)
+    with service(url, out, fresh=not resume) as address, RobotClient(address) as robot:
         batch = Rearrangement(robot, categories, trials, views, seed, done=len(done))
         with screen.status(f"{len(done) + 1} of {trials}") as status:
-            for trial in batch:
+            for trial in kept(batch, lines, settings, lambda trial: jsonlib.dumps(asdict(trial)), tuple(done)):
                 done.append(trial)
-                print(jsonlib.dumps(asdict(trial)), file=file, flush=True)
                 how = trial.failure or f"{trial.rotation_deg:.1f}° and {100 * (trial.position_m or 0):.1f} cm off"
                 screen.print(f"{trial.number:>3}  {trial.name or trial.category:<24} {how}", highlight=False)
                 status.update(f"{len(done) + 1} of {trials}")

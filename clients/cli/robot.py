@@ -13,7 +13,6 @@ from clients.bop_results import HEADER, bop_lines, number_of
 from clients.cli.categories import find
 from clients.cli.local import connected
 from clients.cli.terminal import URL, Folder, Json, Url, console, errors, print_facts, print_json, progress_bar
-from clients.errors import ClientError
 from clients.robot import Observation, RobotClient
 
 if TYPE_CHECKING:
@@ -96,12 +95,10 @@ def scan(
 def _recording(folder: str) -> tuple[Sequence, Burst]:
     """The one object that `folder` holds, and all its views."""
     from clients.datasets.folders import load_burst
-    from clients.datasets.sources import find_sequences
+    from clients.datasets.sources import only_sequence
 
-    sequences = find_sequences(folder)
-    if len(sequences) > 1:
-        raise ClientError(f"{folder} holds {len(sequences)} objects; name one, such as {sequences[0].path}")
-    return sequences[0], load_burst(sequences[0])
+    sequence = only_sequence(folder)
+    return sequence, load_burst(sequence)
 
 
 def _spread(burst: Burst, count: int | None) -> list[int]:
@@ -135,12 +132,13 @@ def _facts(seen: Observation) -> dict[str, object]:
     if seen.probability is not None:
         facts["probability"] = f"{seen.probability:.2f} that it is of the most similar category"
     if seen.candidates:
-        facts["candidates"] = ", ".join(seen.candidates)
+        names = {each.category_id: each.name for each in seen.similarities}
+        facts["candidates"] = ", ".join(names.get(each) or each for each in seen.candidates)
     if seen.viewpoints is not None and len(seen.viewpoints):
         facts["look from"] = ", ".join(f"{value:.2f}" for value in seen.viewpoints[0][:3, 3]) + " m, in the burst's world frame, next"
     if seen.pose is not None:
         facts["scale"] = f"{seen.pose.scale:.3f} of the reference"
-        facts["centre"] = ", ".join(f"{value:.3f}" for value in seen.pose.object_in_world[:3, 3]) + " m in the burst's world frame"
+        facts["centre"] = ", ".join(f"{value:.3f}" for value in seen.pose.world_from_object[:3, 3]) + " m in the burst's world frame"
         facts["box"] = " × ".join(f"{100 * edge:.1f}" for edge in seen.pose.extent_m) + " cm"
         facts["inliers"] = f"{seen.pose.inliers} of {seen.pose.correspondences} correspondences"
     if seen.scan is not None:

@@ -42,6 +42,11 @@ def progress_of(doing: str) -> Iterator[Callable[[int, int], None]]:
         yield lambda done, total: bar.update(task, completed=done, total=total)
 
 
+def when(time: str) -> str:
+    """An ISO time, as of the service's JSON, to the second and without its zone, which is UTC."""
+    return time[:19].replace("T", " ")
+
+
 def print_json(value: object) -> None:
     """JSON on standard output, unwrapped and uncoloured."""
     typer.echo(json.dumps(value, indent=1))

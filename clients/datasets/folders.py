@@ -92,7 +92,8 @@ def find_sequences(root: Path) -> list[Sequence]:
     """Every sequence below `root`, links followed, sorted by path. Raises InvalidInput where there is none."""
     folders = sorted(_sequence_folders(root))
     if not folders:
-        raise InvalidInput("data", f"no {ABOUT} below {root}; expected CATEGORY/INSTANCE/{ABOUT}")
+        other = f"or another layout by its prefix, such as transforms:{root}"
+        raise InvalidInput("data", f"no {ABOUT} below {root}; expected CATEGORY/INSTANCE/{ABOUT}, {other}")
     return [_read_sequence(folder) for folder in folders]
 
 

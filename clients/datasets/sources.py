@@ -11,6 +11,14 @@ from core.offers import Offers
 FORMATS: Offers[folders.Format] = Offers("clients.datasets")
 
 
+def only_sequence(data: Path | str) -> folders.Sequence:
+    """The one recorded object of `data`. Raises InvalidInput where there are several, and as `find_sequences`."""
+    sequences = find_sequences(data)
+    if len(sequences) > 1:
+        raise InvalidInput("data", f"{data} holds {len(sequences)} objects; name one, such as {sequences[0].path}")
+    return sequences[0]
+
+
 def find_sequences(data: Path | str) -> list[folders.Sequence]:
     """Every sequence of a data set, given as FORMAT:FOLDER; a folder alone is in the data layout.
 

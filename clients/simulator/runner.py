@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from rich.console import Console
 
-from clients.errors import ClientError
 from clients.robot import RobotClient
 from clients.simulator import live
 from clients.simulator.encounter import Encounter
 from clients.simulator.episode import Episode, Truth, require_own_memory
 from clients.simulator.fleet import disagreements, together
+from clients.simulator.journal import interrupted, kept
 from clients.simulator.pictures import fetch_pictures
 from clients.simulator.report import EpisodeRecord, shown, write_json, write_report
 from clients.simulator.script import Script
@@ -50,19 +50,6 @@ class Output:
         return [Lesson(**json.loads(line)) for line in interrupted(self.lessons, script.as_settings())]
 
 
-def interrupted(file: Path, settings: Mapping[str, object]) -> list[str]:
-    """The whole lines that an interrupted run left in a file, but the first, which has its settings.
-
-    Raises ClientError where there was none, or it was of other settings.
-    """
-    if not file.is_file():
-        raise ClientError(f"there is no run to resume in {file.parent}; leave out --resume")
-    kept, *rest = file.read_text(encoding="utf-8").splitlines()
-    if json.loads(kept) != json.loads(json.dumps(settings)):
-        raise ClientError(f"the run in {file.parent} was of {kept}; resume it with the same settings, or name another --out")
-    return [line for line in rest if line.endswith("}")]
-
-
 def run_episode(script: Script, url: str, output: Output, console: Console, *, resume: bool = False) -> Summary:
     """All encounters, the report and the JSON; returns the figures. Raises ClientError where the memory is not this episode's."""
     done = output.earlier(script) if resume else []
@@ -77,7 +64,8 @@ def run_episode(script: Script, url: str, output: Output, console: Console, *, r
             own = [each for each in done if each.robot == number]
             episodes.append(Episode(robot, script.subjects(number), conduct, done=own, truth=truth, number=number))
         total = sum(len(each.subjects) for each in episodes)
-        live_ones = _kept(together(episodes) if len(episodes) > 1 else iter(episodes[0]), output.lines, script, done)
+        met = together(episodes) if len(episodes) > 1 else iter(episodes[0])
+        live_ones = kept(met, output.lines, script.as_settings(), Encounter.as_json, done)
         encounters = [*done, *live.show(live_ones, total - len(done), console)]
         summary = summarise(encounters, time.perf_counter() - started)
         summary = replace(summary, disagreements=tuple(disagreements(robots[0], encounters)))
@@ -102,28 +90,12 @@ def run_lessons(script: Script, url: str, output: Output, console: Console, *, r
     with RobotClient(url) as robot:
         require_own_memory(robot, {each.category_id for each in done})
         lessons = Lessons(robot, lambda category, index: groups[category][index], sorted(groups), script.conduct(), done=done)
-        with output.lessons.open("w", encoding="utf-8") as file:
-            file.write(json.dumps(script.as_settings()) + "\n")
-            for lesson in lessons:
-                file.write(json.dumps(asdict(lesson)) + "\n")
-                file.flush()
-                console.print(live.lesson_line(lesson), highlight=False)
+        for lesson in kept(lessons, output.lessons, script.as_settings(), lambda lesson: json.dumps(asdict(lesson))):
+            console.print(live.lesson_line(lesson), highlight=False)
         summary = lessons.summary
     console.print(live.teaching_table(summary))
     (output.folder / "teaching.json").write_text(json.dumps({"meta": script.as_settings(), "summary": asdict(summary)}, indent=1))
     return summary
-
-
-def _kept(encounters: Iterator[Encounter], file: Path, script: Script, done: Sequence[Encounter]) -> Iterator[Encounter]:
-    """The same encounters, each written down before the next one begins."""
-    with file.open("w", encoding="utf-8") as stream:
-        stream.write(json.dumps(script.as_settings()) + "\n")
-        stream.writelines(each.as_json() + "\n" for each in done)
-        stream.flush()
-        for encounter in encounters:
-            stream.write(encounter.as_json() + "\n")
-            stream.flush()
-            yield encounter
 
 
 def _record(robot: RobotClient, script: Script, encounters: Sequence[Encounter], summary: Summary) -> EpisodeRecord:

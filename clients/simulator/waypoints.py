@@ -61,7 +61,7 @@ def visit_waypoints(
     """
     if seen.pose is None:
         return Visit()
-    center_m = seen.pose.object_in_world[:3, 3]
+    center_m = seen.pose.world_from_object[:3, 3]
     radius_m = standoff_m(float(np.linalg.norm(seen.pose.extent_m)), burst.cameras)
     wanted = waypoints(center_m, infer_up(burst.cameras)[0], radius_m, count, seed, arm.at)
     reachable = [pose for pose in wanted if arm.cannot_reach(pose) is None]

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import cv2
 import numpy as np
 import pytest
 
+from benchmarks import parallel
 from core.camera_poses import hemisphere
 from core.sim3 import Sim3
 
@@ -18,6 +21,14 @@ HALF_AXES = np.array([0.5, 0.35, 0.25]) / np.linalg.norm([1.0, 0.7, 0.5])
 DISTANCE = 3.0
 """Of the cameras, in object diagonals."""
 DEPTH_SCALE_MM = 0.1
+
+
+@pytest.fixture
+def small_world(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, backbone: Any) -> Callable[[ModuleType], None]:
+    """small_world(benchmark): it runs with the colour backbone, a cache of its own, and in this process."""
+    monkeypatch.setenv("ONELOOK_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setattr(parallel, "worker_count", lambda jobs: 1)  # a process of its own takes seconds to import torch
+    return lambda benchmark: monkeypatch.setattr(benchmark, "load_backbone", lambda name: backbone)
 
 
 @pytest.fixture

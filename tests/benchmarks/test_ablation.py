@@ -4,20 +4,14 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
-import pytest
-
-from benchmarks import ablation, parallel
+from benchmarks import ablation
 from benchmarks.ablation import CHANGES, ORACLE
-from core.backbones.base import Backbone
 
 
-def test_every_change_has_a_row_and_nothing_beats_the_truths_own_choice(
-    recorded: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, backbone: Backbone
-) -> None:
-    monkeypatch.setattr(ablation, "load_backbone", lambda name: backbone)
-    monkeypatch.setattr(parallel, "worker_count", lambda jobs: 1)
-    monkeypatch.setenv("ONELOOK_CACHE", str(tmp_path / "cache"))
+def test_every_change_has_a_row_and_nothing_beats_the_truths_own_choice(recorded: Path, tmp_path: Path, small_world: Any) -> None:
+    small_world(ablation)
     rows = {row.change: row for row in ablation.run(recorded, ["4"], 1, tmp_path / "ablation.json", 0, "colour")}
     assert list(rows) == list(CHANGES)
     assert rows["best"].acc30 == 100

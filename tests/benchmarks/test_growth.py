@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
@@ -59,7 +60,7 @@ def test_each_size_is_asked_after_it_was_filled(monkeypatch: pytest.MonkeyPatch,
 
     def measure(probe: Probe) -> GrowthRow:
         probes.append(probe)
-        figures = dict.fromkeys(growth.COLUMNS, 1.0) | {"categories": sum(filled), "exact": True}
+        figures = dict.fromkeys((field.name for field in fields(growth.GrowthRow)), 1.0) | {"categories": sum(filled), "exact": True}
         return GrowthRow(**figures)
 
     rows = growth.run(fill, measure, tmp_path / "growth.json", tmp_path / "growth.png", (2, 5), views=2, rounds=3, exact_up_to=2)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -40,9 +41,8 @@ def test_rows_are_means_over_views_then_categories() -> None:
     assert (everything.category, everything.iou, everything.missed, everything.views) == ("all", 50, 25, 3)
 
 
-def test_an_object_on_black_is_found(recorded: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, backbone) -> None:
-    monkeypatch.setattr(isolation, "load_backbone", lambda name: backbone)
-    monkeypatch.setenv("ONELOOK_CACHE", str(tmp_path / "cache"))
+def test_an_object_on_black_is_found(recorded: Path, small_world: Any) -> None:
+    small_world(isolation)
     *_, everything = isolation.run(recorded, None, ["saliency"])
     assert everything.iou > 85
     assert everything.views == 8

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from benchmarks import paper, parallel, pose
+from benchmarks import paper, pose
 from benchmarks.contenders import Sweep
 from benchmarks.paper import PUBLISHED, SWEEPS, beside
 from core.errors import InvalidInput
@@ -26,10 +27,8 @@ def test_without_measurements_the_published_figures_stand_alone() -> None:
     assert (ucd.paper_median_deg, ucd.paper_acc30, ucd.paper_acc15, ucd.paper_acc7_5) == (26.2, 64.5, 49.4, 29.2)
 
 
-def test_both_tables_from_one_run(recorded: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, backbone) -> None:
-    monkeypatch.setattr(pose, "load_backbone", lambda name: backbone)
-    monkeypatch.setenv("ONELOOK_CACHE", str(tmp_path / "cache"))
-    monkeypatch.setattr(parallel, "worker_count", lambda jobs: 1)
+def test_both_tables_from_one_run(recorded: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, small_world: Any) -> None:
+    small_world(pose)
     sweeps = [Sweep(["ucd"], ["4"], dims=[32, 24])]
     monkeypatch.setattr(paper, "SWEEPS", sweeps)
     monkeypatch.setattr(paper, "PUBLISHED", (paper.Published(1, "Ours-UCD", 10, 32, 26.2, 64.5, 49.4, 29.2, ("ucd", "4", 32)),))
@@ -40,7 +39,7 @@ def test_both_tables_from_one_run(recorded: Path, tmp_path: Path, monkeypatch: p
     assert (written["meta"]["benchmark"], len(written["rows"])) == ("paper", 2)
 
 
-def test_ten_views_are_needed(recorded: Path, monkeypatch: pytest.MonkeyPatch, backbone) -> None:
-    monkeypatch.setattr(pose, "load_backbone", lambda name: backbone)
+def test_ten_views_are_needed(recorded: Path, small_world: Any) -> None:
+    small_world(pose)
     with pytest.raises(InvalidInput, match="10 were asked for"):
         paper.run(recorded, 1, None)

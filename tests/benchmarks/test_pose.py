@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks import parallel, pose
+from benchmarks import pose
 from benchmarks.contenders import Setting, Sweep, contender
 from benchmarks.pairs import ViewCounts
 from clients.datasets.folders import find_sequences
@@ -30,11 +30,8 @@ COLUMNS = {
 
 
 @pytest.fixture(autouse=True)
-def small_world(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, backbone) -> None:
-    """The benchmark with the colour backbone, a cache of its own, and in this process."""
-    monkeypatch.setattr(pose, "load_backbone", lambda name: backbone)
-    monkeypatch.setenv("ONELOOK_CACHE", str(tmp_path / "cache"))
-    monkeypatch.setattr(parallel, "worker_count", lambda jobs: 1)  # a process of its own takes seconds to import torch
+def small(small_world) -> None:
+    small_world(pose)
 
 
 def test_a_known_similarity_is_recovered(recorded: Path, tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks import parallel, pose
+from benchmarks import pose
 from benchmarks.contenders import Sweep
 from core.camera_poses import hemisphere
 from core.sim3 import Sim3
@@ -32,11 +32,9 @@ def sequence(root: Path, name: str, egg: Any, world_from_model: Sim3) -> list[di
 
 
 def test_labelled_sequences_are_estimated_and_translations_scored_in_the_papers_unit(
-    tmp_path: Path, ellipsoid: Any, backbone: Any, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, ellipsoid: Any, small_world: Any
 ) -> None:
-    monkeypatch.setattr(pose, "load_backbone", lambda name: backbone)
-    monkeypatch.setenv("ONELOOK_CACHE", str(tmp_path / "cache"))
-    monkeypatch.setattr(parallel, "worker_count", lambda jobs: 1)
+    small_world(pose)
     root, egg = tmp_path / "co3d", ellipsoid(HALF_AXES)
     frames = sequence(root, "1_1_1", egg, REFERENCE) + sequence(root, "2_2_2", egg, TARGET_FROM_REFERENCE @ REFERENCE)
     write_annotations(root, "egg", frames)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks import clean_memory, parallel, robustness
+from benchmarks import clean_memory, robustness
 from benchmarks.clean_memory import Decisions
 from benchmarks.degradations.catalogue import catalogue
 from benchmarks.robustness import CLEAN, Outcome, breaks_at, figures, run, table_rows
@@ -26,12 +26,9 @@ MISSED = Decisions(own=0.0, rival=1.0, right=False, nearest=False, uncertain=Fal
 
 
 @pytest.fixture(autouse=True)
-def small_world(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, backbone) -> None:
-    """The benchmark with the colour backbone, a cache of its own, and in this process."""
-    monkeypatch.setattr(robustness, "load_backbone", lambda name: backbone)
+def small(small_world, monkeypatch: pytest.MonkeyPatch, backbone) -> None:
+    small_world(robustness)
     monkeypatch.setattr(robustness, "backbone_named", lambda name: backbone)
-    monkeypatch.setenv("ONELOOK_CACHE", str(tmp_path / "cache"))
-    monkeypatch.setattr(parallel, "worker_count", lambda jobs: 1)
 
 
 @pytest.fixture

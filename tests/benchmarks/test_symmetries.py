@@ -50,9 +50,8 @@ def test_rows_are_sums() -> None:
     assert everything == SymmetryRow("all", 3, 1, 1, 0, 1)
 
 
-def test_an_object_painted_by_place_has_none(recorded: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, backbone: Any) -> None:
-    monkeypatch.setattr(symmetries, "load_backbone", lambda name: backbone)
-    monkeypatch.setenv("ONELOOK_CACHE", str(tmp_path / "cache"))
+def test_an_object_painted_by_place_has_none(recorded: Path, tmp_path: Path, small_world: Any) -> None:
+    small_world(symmetries)
     *_, everything = symmetries.run(recorded, tmp_path / "rows.json")
     assert (everything.objects > 0, everything.symmetric, everything.false) == (True, 0, 0)
     assert (tmp_path / "rows.json").exists()

@@ -2,30 +2,30 @@
 
 from __future__ import annotations
 
-import threading
-import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
 import pytest
-import uvicorn
 from numpy.typing import NDArray
 
-from clients.datasets.folders import Sequence, find_sequences
+from clients.answers import Category
+from clients.datasets.folders import Sequence, find_sequences, load_burst
 from clients.robot import RobotClient
 from clients.simulator.episode import Conduct, Episode, shuffled
 from clients.simulator.pictures import fetch_pictures
 from clients.simulator.replay import ReplaySubject
 from clients.simulator.report import EpisodeRecord
 from clients.simulator.summary import summarise
-from core.backbones.base import Features, shown_patches
-from service.app import create_app
+from core.backbones.base import Backbone, Features, shown_patches
+from core.views import Burst
 from service.settings import Settings
 
 SAMPLES = Path(__file__).parents[1] / "data" / "bursts"
+Serving = Callable[[Settings, Backbone], AbstractContextManager[str]]
 
 
 class CentreBackbone:
@@ -57,29 +57,19 @@ class CentreBackbone:
 
 
 @pytest.fixture(scope="session")
-def samples() -> list[Sequence]:
+def recordings() -> list[Sequence]:
     """The sample sequences."""
     return find_sequences(SAMPLES)
 
 
-@contextmanager
-def serving(memory: Path) -> Iterator[str]:
-    """The address of a service for which everything but an identical burst is novel."""
-    app = create_app(Settings(data_dir=memory, score="pooled_best_view", threshold=0.9999), backbone=CentreBackbone())
-    server = uvicorn.Server(uvicorn.Config(app, host="127.0.0.1", port=0, log_level="warning"))
-    thread = threading.Thread(target=server.run, daemon=True)
-    thread.start()
-    while not server.started:
-        time.sleep(0.01)
-    yield f"http://127.0.0.1:{server.servers[0].sockets[0].getsockname()[1]}"
-    server.should_exit = True
-    thread.join()
+SERVICE: dict[str, Any] = {"score": "pooled_best_view", "threshold": 0.9999}
+"""Settings of a service for which everything but an identical burst is novel."""
 
 
 @pytest.fixture
-def url(tmp_path: Path) -> Iterator[str]:
+def url(tmp_path: Path, serving: Serving) -> Iterator[str]:
     """The address of a service with an empty memory."""
-    with serving(tmp_path / "memory") as address:
+    with serving(Settings(data_dir=tmp_path / "memory", **SERVICE), CentreBackbone()) as address:
         yield address
 
 
@@ -90,11 +80,28 @@ def robot(url: str) -> Iterator[RobotClient]:
         yield client
 
 
+@pytest.fixture
+def burst(recordings: list[Sequence]) -> Burst:
+    """Four views of a car."""
+    return load_burst(recordings[0], range(4))
+
+
+@pytest.fixture
+def learnt(robot: RobotClient, burst: Burst) -> Category:
+    """The category that it makes."""
+    scan = robot.scan(burst, viewpoints=4, up=(0, 0, 1), standoff_m=1.0)
+    assert len(scan) == 4
+    for view in burst.views:
+        scan.add(view)
+    return scan.complete("car")
+
+
 @pytest.fixture(scope="session")
-def record(samples: list[Sequence], tmp_path_factory: pytest.TempPathFactory) -> EpisodeRecord:
+def record(recordings: list[Sequence], serving: Serving, tmp_path_factory: pytest.TempPathFactory) -> EpisodeRecord:
     """An episode: one object twice from the same sides, which the backbone recognises, and another of its category, which it does not."""
-    with serving(tmp_path_factory.mktemp("episode") / "memory") as address, RobotClient(address) as robot:
-        subjects = shuffled([ReplaySubject(samples[index]) for index in (0, 0, 1)], seed=1)
+    memory = tmp_path_factory.mktemp("episode") / "memory"
+    with serving(Settings(data_dir=memory, **SERVICE), CentreBackbone()) as address, RobotClient(address) as robot:
+        subjects = shuffled([ReplaySubject(recordings[index]) for index in (0, 0, 1)], seed=1)
         encounters = list(Episode(robot, subjects, Conduct(views=12, seed=1)))
         pictures = {index: fetch_pictures(robot, encounter) for index, encounter in enumerate(encounters)}
         settings = {"seed": 1, "views": 12}

@@ -26,9 +26,9 @@ def test_both_clients_have_the_same_methods_with_the_same_arguments() -> None:
     assert all(inspect.iscoroutinefunction(getattr(AsyncRobotClient, name)) for name in waited_for)
 
 
-def test_a_novel_object_is_scanned_learnt_and_recognised(url: str, samples: list[Sequence]) -> None:
+def test_a_novel_object_is_scanned_learnt_and_recognised(url: str, recordings: list[Sequence]) -> None:
     async def meet() -> None:
-        burst = load_burst(samples[0], range(4))
+        burst = load_burst(recordings[0], range(4))
         async with AsyncRobotClient(url) as robot:
             seen = await robot.observe(burst)
             assert seen.scan is not None

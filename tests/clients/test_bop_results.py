@@ -16,10 +16,10 @@ K = np.array([[50.0, 0, 20], [0, 50, 16], [0, 0, 1]])
 
 def test_each_image_has_a_line_in_the_published_order() -> None:
     """The object is 2 m before the first camera; the second one, a quarter turn about x away, has it 2 m above its axis."""
-    object_in_world, turned = np.eye(4), np.eye(4)
-    object_in_world[:3, 3] = [0.1, 0.0, 2.0]
+    world_from_object, turned = np.eye(4), np.eye(4)
+    world_from_object[:3, 3] = [0.1, 0.0, 2.0]
     turned[:3, :3] = [[1, 0, 0], [0, 0, -1], [0, 1, 0]]
-    pose = Pose(Sim3.identity(), object_in_world, np.ones(3), np.zeros((8, 3)), 9, 10, 0, 0.01, 0.5, None, (), np.zeros((0, 4)))
+    pose = Pose(Sim3.identity(), world_from_object, np.ones(3), np.zeros((8, 3)), 9, 10, 0, 0.01, 0.5, None, (), np.zeros((0, 4)))
     lines = bop_lines(pose, [Camera(K, np.eye(4)), Camera(K, turned)], [Path("000012.jpg"), Path("left.png")], 7, 5, 1.25)
     assert HEADER == "scene_id,im_id,obj_id,score,R,t,time"
     assert lines[0] == "7,12,5,0.5,1 0 0 0 1 0 0 0 1,100 0 2000,1.25"

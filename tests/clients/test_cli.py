@@ -40,8 +40,8 @@ def test_help_names_every_command_without_heavy_imports() -> None:
     assert all(name in onelook("bench", "--help").output for name in ("pose", "discovery", "speed", "isolation"))
 
 
-def test_an_object_is_taught_named_recognised_and_forgotten(url: str, samples: list[Sequence]) -> None:
-    folder = samples[0].path
+def test_an_object_is_taught_named_recognised_and_forgotten(url: str, recordings: list[Sequence]) -> None:
+    folder = recordings[0].path
     assert "outcome" in onelook("observe", folder, "--views", 2, "--url", url).output
     taught = onelook("scan", folder, "--name", "bug", "--url", url)
     assert taught.exit_code == 0, taught.output
@@ -61,8 +61,8 @@ def test_an_object_is_taught_named_recognised_and_forgotten(url: str, samples: l
     assert "empty" in onelook("categories", "list", "--url", url).output
 
 
-def test_answers_in_other_formats(url: str, samples: list[Sequence]) -> None:
-    folder = samples[0].path
+def test_answers_in_other_formats(url: str, recordings: list[Sequence]) -> None:
+    folder = recordings[0].path
     assert onelook("observe", folder, "--views", 2, "--format", "bop", "--url", url).output == "scene_id,im_id,obj_id,score,R,t,time\n"
     onelook("scan", folder, "--views", 3, "--url", url)
     header, *lines = onelook("observe", folder, "--views", 3, "--format", "bop", "--url", url).output.splitlines()
@@ -73,20 +73,20 @@ def test_answers_in_other_formats(url: str, samples: list[Sequence]) -> None:
     assert len(message["detections"]) == 1
 
 
-def test_photographs_ask_what_an_object_is(url: str, samples: list[Sequence]) -> None:
-    seen = json.loads(onelook("observe", f"images:{samples[0].path / 'rgb'}", "--views", 3, "--json", "--url", url).output)
+def test_photographs_ask_what_an_object_is(url: str, recordings: list[Sequence]) -> None:
+    seen = json.loads(onelook("observe", f"images:{recordings[0].path / 'rgb'}", "--views", 3, "--json", "--url", url).output)
     assert (seen["outcome"], seen["views"], seen["scan"]) == ("novel", 3, None)
 
 
-def test_without_a_service_the_memory_is_opened_here(samples: list[Sequence], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_a_service_the_memory_is_opened_here(recordings: list[Sequence], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(service.app, "load_backbone", lambda name, device, report: CentreBackbone())
     monkeypatch.setenv("ONELOOK_DATA_DIR", str(tmp_path / "memory"))
     monkeypatch.setenv("ONELOOK_THRESHOLD", "0.9999")
-    taught = onelook("scan", samples[0].path, "--local", "--views", 2, "--name", "bug")
+    taught = onelook("scan", recordings[0].path, "--local", "--views", 2, "--name", "bug")
     assert taught.exit_code == 0, taught.output
-    assert json.loads(onelook("observe", samples[0].path, "--local", "--views", 2, "--json").stdout)["name"] == "bug"
+    assert json.loads(onelook("observe", recordings[0].path, "--local", "--views", 2, "--json").stdout)["name"] == "bug"
     with Memory.open(tmp_path / "memory"):
-        taken = onelook("observe", samples[0].path, "--local")
+        taken = onelook("observe", recordings[0].path, "--local")
     assert taken.exit_code == 1
     assert "open in another process" in taken.output
 
@@ -108,18 +108,18 @@ def test_every_command_has_json() -> None:
     assert lacking <= WITHOUT_JSON
 
 
-def test_the_demo_writes_its_report(url: str, samples: list[Sequence], tmp_path: Path) -> None:
-    done = onelook("simulate", "--url", url, "--data", samples[0].path.parent, "--out", tmp_path / "demo", "--views", 3)
+def test_the_demo_writes_its_report(url: str, recordings: list[Sequence], tmp_path: Path) -> None:
+    done = onelook("simulate", "--url", url, "--data", recordings[0].path.parent, "--out", tmp_path / "demo", "--views", 3)
     assert done.exit_code == 0, done.output
     assert "false novel" in done.output
     assert (tmp_path / "demo" / "report.html").stat().st_size > 10_000
     assert json.loads((tmp_path / "demo" / "episode.json").read_text())["summary"]["objects"] == 3
 
 
-def test_photographs_become_a_folder_in_the_data_layout(samples: list[Sequence], tmp_path: Path) -> None:
-    source = f"images:{samples[0].path / 'rgb'}"
+def test_photographs_become_a_folder_in_the_data_layout(recordings: list[Sequence], tmp_path: Path) -> None:
+    source = f"images:{recordings[0].path / 'rgb'}"
     written = json.loads(onelook("convert", source, tmp_path / "out", "--json").output)
-    assert written == [str(tmp_path / "out" / samples[0].path.name / "rgb")]
+    assert written == [str(tmp_path / "out" / recordings[0].path.name / "rgb")]
     assert "not empty" in onelook("convert", source, tmp_path / "out").output
 
 
@@ -139,8 +139,8 @@ def test_errors_are_one_sentence_with_the_remedy(words: list[str], says: str) ->
     assert "Traceback" not in failed.output
 
 
-def test_a_folder_of_many_objects_and_an_unknown_category_are_refused(url: str, samples: list[Sequence]) -> None:
-    assert "holds 3 objects; name one" in onelook("observe", samples[0].path.parent).output
+def test_a_folder_of_many_objects_and_an_unknown_category_are_refused(url: str, recordings: list[Sequence]) -> None:
+    assert "holds 3 objects; name one" in onelook("observe", recordings[0].path.parent).output
     assert "no category is called 'cup'" in onelook("categories", "forget", "cup", "--url", url).output
 
 

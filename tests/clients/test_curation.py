@@ -7,25 +7,8 @@ import pytest
 
 from clients import errors
 from clients.answers import Category
-from clients.datasets.folders import Sequence, load_burst
 from clients.robot import RobotClient
 from core.views import Burst
-
-
-@pytest.fixture
-def burst(samples: list[Sequence]) -> Burst:
-    """Four views of a car."""
-    return load_burst(samples[0], range(4))
-
-
-@pytest.fixture
-def learnt(robot: RobotClient, burst: Burst) -> Category:
-    """The category that it makes."""
-    scan = robot.scan(burst, viewpoints=4, up=(0, 0, 1), standoff_m=1.0)
-    assert len(scan) == 4
-    for view in burst.views:
-        scan.add(view)
-    return scan.complete("car")
 
 
 def test_a_scan_tells_what_is_covered_and_replaces_what_cannot_be_reached(robot: RobotClient, burst: Burst) -> None:
@@ -67,7 +50,7 @@ def test_an_object_shown_where_it_belongs_is_brought_there(robot: RobotClient, l
     plan = robot.plan(goal.id, burst, up=(0, 0, 1))
     assert plan.goal.name == robot.goal(goal.id).name == "the shelf"
     np.testing.assert_allclose(plan.goal_from_current, np.eye(4), atol=0.02)
-    np.testing.assert_allclose(plan.object_in_world, shown.pose.object_in_world, atol=0.02)
+    np.testing.assert_allclose(plan.world_from_object, shown.pose.world_from_object, atol=0.02)
     robot.forget_goal(goal.id)
     assert robot.goals(learnt.id) == []
 

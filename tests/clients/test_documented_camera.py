@@ -35,11 +35,11 @@ def write(folder: Path, sequence: Sequence) -> None:
 
 
 @pytest.fixture
-def page(url: str, samples: list[Sequence], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
+def page(url: str, recordings: list[Sequence], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
     """page(block, …): runs blocks of the page, one after the other, beside two mugs; the names that they leave behind."""
     monkeypatch.chdir(tmp_path)
-    write(tmp_path / "my_mug", samples[0])
-    write(tmp_path / "another_mug", samples[0])  # the backbone of these tests knows nothing but the very same again
+    write(tmp_path / "my_mug", recordings[0])
+    write(tmp_path / "another_mug", recordings[0])  # the backbone of these tests knows nothing but the very same again
     names: dict[str, Any] = {}
 
     def run(*blocks: str) -> SimpleNamespace:
@@ -51,8 +51,8 @@ def page(url: str, samples: list[Sequence], tmp_path: Path, monkeypatch: pytest.
     names["robot"].close()
 
 
-def test_a_folder_of_images_is_read_in_metres(page: Any, samples: list[Sequence]) -> None:
-    views, recorded = page(READ).views_of(Path("my_mug")), load_burst(samples[0]).views
+def test_a_folder_of_images_is_read_in_metres(page: Any, recordings: list[Sequence]) -> None:
+    views, recorded = page(READ).views_of(Path("my_mug")), load_burst(recordings[0]).views
     assert len(views) == 12
     for view, right in zip(views, recorded, strict=True):
         np.testing.assert_array_equal(view.rgb, right.rgb)
@@ -73,4 +73,4 @@ def test_a_live_camera_follows_it_in_its_own_frame(page: Any) -> None:
     device = SimpleNamespace(grab=lambda: Frame(view.rgb, view.depth_m, view.camera.K))
     (tracked,) = islice(ran.follow(device, ran.robot.categories()[0].id), 1)
     assert tracked.pose is not None
-    assert 0.2 < np.linalg.norm(tracked.pose.object_in_world[:3, 3]) < 3
+    assert 0.2 < np.linalg.norm(tracked.pose.world_from_object[:3, 3]) < 3

@@ -62,17 +62,19 @@ def test_the_loop_learns_a_category_and_knows_it_then(
     assert "[" in capsys.readouterr().out
 
 
-def test_the_asynchronous_loop_learns_too(url: str, samples: list[Sequence]) -> None:
+def test_the_asynchronous_loop_learns_too(url: str, recordings: list[Sequence]) -> None:
     meet = run(ASYNCHRONOUS, url)["meet"]
-    assert asyncio.run(meet(load_burst(samples[0], range(4)), recorded(samples[0].path))).name == "cup"
+    assert asyncio.run(meet(load_burst(recordings[0], range(4)), recorded(recordings[0].path))).name == "cup"
 
 
-def test_an_object_is_followed_and_events_are_told(robot: RobotClient, samples: list[Sequence], capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_object_is_followed_and_events_are_told(
+    robot: RobotClient, recordings: list[Sequence], capsys: pytest.CaptureFixture[str]
+) -> None:
     names: dict[str, Any] = {}
     exec(compile(STREAMS, "docs/robot.md", "exec"), names)
-    (tracked,) = names["follow"](robot, load_burst(samples[0], [0]).views)
+    (tracked,) = names["follow"](robot, load_burst(recordings[0], [0]).views)
     assert tracked.pose is None  # the memory is empty
-    robot.scan(load_burst(samples[0], range(2)))
+    robot.scan(load_burst(recordings[0], range(2)))
     events = robot.events(after=0)
     names["watch"](SimpleNamespace(events=lambda: [next(events)]))
     assert capsys.readouterr().out.startswith("scan_begun {")

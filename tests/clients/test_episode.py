@@ -47,12 +47,12 @@ def met(record: EpisodeRecord) -> list[Encounter]:
     return list(record.encounters)
 
 
-def test_an_episode_learns_recognises_and_scores(met: list[Encounter], samples: list[Sequence]) -> None:
-    first, last = ([each for each in met if each.name == samples[index].name] for index in (0, 1))
+def test_an_episode_learns_recognises_and_scores(met: list[Encounter], recordings: list[Sequence]) -> None:
+    first, last = ([each for each in met if each.name == recordings[index].name] for index in (0, 1))
     assert [each.number for each in met] == [1, 2, 3]
     assert {each.verdict for each in met} == {Verdict.NEW, Verdict.RECOGNISED, Verdict.FALSE_NOVEL}
     again = next(each for each in first if each.verdict is Verdict.RECOGNISED)
-    assert again.kind == samples[0].category
+    assert again.kind == recordings[0].category
     assert again.error is not None
     assert again.error.rotation_deg < 10
     assert last[0].learnt is not None
@@ -79,14 +79,14 @@ def test_an_episode_without_known_objects_has_no_accuracy(met: list[Encounter]) 
     assert "Acc30" not in {what for what, _, _ in summary_rows(summary)}
 
 
-def test_the_order_depends_on_the_seed_alone(samples: list[Sequence]) -> None:
-    subjects = [ReplaySubject(each) for each in samples]
+def test_the_order_depends_on_the_seed_alone(recordings: list[Sequence]) -> None:
+    subjects = [ReplaySubject(each) for each in recordings]
     orders = [[each.name for each in shuffled(subjects, seed)] for seed in (3, 3, 4)]
     assert orders[0] == orders[1] != orders[2]
 
 
-def test_a_used_memory_is_refused_unless_the_episode_made_it(robot: RobotClient, samples: list[Sequence], met: list[Encounter]) -> None:
-    burst = load_burst(samples[0], range(2))
+def test_a_used_memory_is_refused_unless_the_episode_made_it(robot: RobotClient, recordings: list[Sequence], met: list[Encounter]) -> None:
+    burst = load_burst(recordings[0], range(2))
     scan = robot.scan(burst)
     for view in burst.views:
         scan.add(view)
@@ -101,18 +101,18 @@ def test_an_encounter_is_a_line_of_json_and_back(met: list[Encounter]) -> None:
         assert Encounter.from_json(each.as_json()) == each
 
 
-def test_a_resumed_episode_meets_the_rest_and_knows_who_founded_what(url: str, samples: list[Sequence]) -> None:
-    subjects = [ReplaySubject(samples[0])] * 2
+def test_a_resumed_episode_meets_the_rest_and_knows_who_founded_what(url: str, recordings: list[Sequence]) -> None:
+    subjects = [ReplaySubject(recordings[0])] * 2
     conduct = Conduct(views=12)
     with RobotClient(url) as robot:
         (first,) = list(Episode(robot, subjects[:1], conduct))
         (second,) = list(Episode(robot, subjects, conduct, done=[Encounter.from_json(first.as_json())]))
-    assert (second.number, second.verdict, second.kind) == (2, Verdict.RECOGNISED, samples[0].category)
+    assert (second.number, second.verdict, second.kind) == (2, Verdict.RECOGNISED, recordings[0].category)
     assert second.error is not None
 
 
 def test_what_is_not_seen_is_left_undecided_and_the_robot_goes_on(
-    robot: RobotClient, samples: list[Sequence], monkeypatch: pytest.MonkeyPatch
+    robot: RobotClient, recordings: list[Sequence], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     observe, asked = robot.observe, []
 
@@ -123,15 +123,15 @@ def test_what_is_not_seen_is_left_undecided_and_the_robot_goes_on(
         return observe(burst, **options)
 
     monkeypatch.setattr(robot, "observe", blind_once)
-    first, second = Episode(robot, [ReplaySubject(each) for each in samples[:2]], Conduct(views=6))
+    first, second = Episode(robot, [ReplaySubject(each) for each in recordings[:2]], Conduct(views=6))
     assert (first.verdict, first.failure) == (Verdict.UNDECIDED, "views: no view shows an object that stands out")
     assert second.verdict is Verdict.NEW
     assert fetch_pictures(robot, first).rgb is None
     assert disagreements(robot, [first, second]) == []
 
 
-def test_lost_views_never_arrive(robot: RobotClient, samples: list[Sequence]) -> None:
-    (met,) = list(Episode(robot, [ReplaySubject(samples[0])], Conduct(views=12, lost_views=0.5)))
+def test_lost_views_never_arrive(robot: RobotClient, recordings: list[Sequence]) -> None:
+    (met,) = list(Episode(robot, [ReplaySubject(recordings[0])], Conduct(views=12, lost_views=0.5)))
     assert 1 <= met.views < 12
 
 

@@ -41,8 +41,8 @@ def unlucky(url: str, transport: LosesAnswers, monkeypatch: pytest.MonkeyPatch) 
         yield robot
 
 
-def test_each_change_is_made_once(unlucky: RobotClient, transport: LosesAnswers, samples: list[Sequence]) -> None:
-    burst = load_burst(samples[0], range(3))
+def test_each_change_is_made_once(unlucky: RobotClient, transport: LosesAnswers, recordings: list[Sequence]) -> None:
+    burst = load_burst(recordings[0], range(3))
     scan = unlucky.scan(burst)
     scan.add(burst.views[0])  # this answer is lost, those to the same path are not
     for view in burst.views[1:]:

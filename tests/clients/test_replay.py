@@ -36,18 +36,18 @@ def test_spread_takes_all_where_there_are_no_more() -> None:
     assert spread(CAMERAS[:3], 8) == [0, 1, 2]
 
 
-def test_a_recorded_pose_is_answered_exactly(samples: list[Sequence]) -> None:
-    world = ReplayWorld(samples[0])
-    recorded = load_burst(samples[0]).views[5]
+def test_a_recorded_pose_is_answered_exactly(recordings: list[Sequence]) -> None:
+    world = ReplayWorld(recordings[0])
+    recorded = load_burst(recordings[0]).views[5]
     assert recorded.camera is not None
     view = world.capture(recorded.camera.world_from_camera)
     np.testing.assert_array_equal(view.rgb, recorded.rgb)
     assert world.offsets_deg == [pytest.approx(0, abs=1e-3)]
 
 
-def test_a_requested_pose_is_answered_by_the_nearest_and_says_how_far_off(samples: list[Sequence]) -> None:
-    world = ReplayWorld(samples[0])
-    cameras = load_burst(samples[0]).cameras
+def test_a_requested_pose_is_answered_by_the_nearest_and_says_how_far_off(recordings: list[Sequence]) -> None:
+    world = ReplayWorld(recordings[0])
+    cameras = load_burst(recordings[0]).cameras
     center = aim_point(cameras)
     turned = np.eye(4)
     axis = cameras[5].world_from_camera[:3, 1]
@@ -62,16 +62,16 @@ def test_a_requested_pose_is_answered_by_the_nearest_and_says_how_far_off(sample
     assert world.offsets_deg[0] == pytest.approx(2, abs=0.2)
 
 
-def test_each_view_is_brought_once_before_any_again(samples: list[Sequence]) -> None:
-    world = ReplayWorld(samples[0])
-    cameras = load_burst(samples[0]).cameras
+def test_each_view_is_brought_once_before_any_again(recordings: list[Sequence]) -> None:
+    world = ReplayWorld(recordings[0])
+    cameras = load_burst(recordings[0]).cameras
     pose = cameras[0].world_from_camera
     brought = [world.capture(pose) for _ in range(len(cameras) + 1)]
     assert len({view.rgb.tobytes() for view in brought}) == len(cameras)
     assert world.offsets_deg[-1] == pytest.approx(0, abs=1e-3)
 
 
-def test_a_glance_is_spread(samples: list[Sequence]) -> None:
-    world = ReplayWorld(samples[0])
+def test_a_glance_is_spread(recordings: list[Sequence]) -> None:
+    world = ReplayWorld(recordings[0])
     assert len(world.glance(4)) == 4
-    assert len(world.glance()) == len(load_burst(samples[0]))
+    assert len(world.glance()) == len(load_burst(recordings[0]))

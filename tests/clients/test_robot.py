@@ -21,8 +21,8 @@ def answering(handler: httpx.MockTransport) -> RobotClient:
     return RobotClient(http=httpx.Client(transport=handler, base_url="http://robot.test"), retry=Retry(attempts=1))
 
 
-def test_a_novel_object_is_scanned_learnt_and_recognised(robot: RobotClient, samples: list[Sequence]) -> None:
-    burst = load_burst(samples[0])
+def test_a_novel_object_is_scanned_learnt_and_recognised(robot: RobotClient, recordings: list[Sequence]) -> None:
+    burst = load_burst(recordings[0])
     seen = robot.observe(burst)
     assert seen.outcome == "novel"
     assert seen.pose is None
@@ -34,13 +34,13 @@ def test_a_novel_object_is_scanned_learnt_and_recognised(robot: RobotClient, sam
     assert (again.outcome, again.category_id, again.name) == ("known", category.id, "car")
     assert again.pose is not None
     np.testing.assert_allclose(again.pose.matrix, np.eye(4), atol=0.02)
-    assert again.pose.object_in_world.shape == (4, 4)
+    assert again.pose.world_from_object.shape == (4, 4)
     assert again.timings_ms["total"] > 0
     assert again.similarities[0].category_id == category.id
 
 
-def test_a_scan_asks_for_camera_poses_that_a_world_answers(robot: RobotClient, samples: list[Sequence]) -> None:
-    world = ReplayWorld(samples[0])
+def test_a_scan_asks_for_camera_poses_that_a_world_answers(robot: RobotClient, recordings: list[Sequence]) -> None:
+    world = ReplayWorld(recordings[0])
     scan = robot.scan(world.glance(3))
     for viewpoint in scan:
         scan.add(world.capture(viewpoint))
@@ -49,9 +49,9 @@ def test_a_scan_asks_for_camera_poses_that_a_world_answers(robot: RobotClient, s
     assert category.name is None
 
 
-def test_categories_are_listed_named_and_forgotten(robot: RobotClient, samples: list[Sequence]) -> None:
-    scan = robot.scan(load_burst(samples[0], range(2)))
-    for view in load_burst(samples[0], range(2)).views:
+def test_categories_are_listed_named_and_forgotten(robot: RobotClient, recordings: list[Sequence]) -> None:
+    scan = robot.scan(load_burst(recordings[0], range(2)))
+    for view in load_burst(recordings[0], range(2)).views:
         scan.add(view)
     category = scan.complete()
     assert robot.rename(category.id, "bug").name == "bug"
@@ -61,8 +61,8 @@ def test_categories_are_listed_named_and_forgotten(robot: RobotClient, samples: 
     assert robot.categories() == []
 
 
-def test_a_burst_can_travel_exactly(robot: RobotClient, samples: list[Sequence]) -> None:
-    burst = load_burst(samples[0], range(2))
+def test_a_burst_can_travel_exactly(robot: RobotClient, recordings: list[Sequence]) -> None:
+    burst = load_burst(recordings[0], range(2))
     seen = robot.observe(burst, exact=True, debug=True)
     assert seen.raw["views"] == 2
     assert robot.observation(seen.id).id == seen.id
@@ -70,9 +70,9 @@ def test_a_burst_can_travel_exactly(robot: RobotClient, samples: list[Sequence])
         robot.observe(burst, exact=True, frame="map")
 
 
-def test_a_scan_can_be_taken_up_again_and_forgotten(robot: RobotClient, samples: list[Sequence]) -> None:
-    views = load_burst(samples[0], range(2)).views
-    begun = robot.scan(load_burst(samples[0], range(2)))
+def test_a_scan_can_be_taken_up_again_and_forgotten(robot: RobotClient, recordings: list[Sequence]) -> None:
+    views = load_burst(recordings[0], range(2)).views
+    begun = robot.scan(load_burst(recordings[0], range(2)))
     begun.add(views[0])
     again = robot.open_scan(begun.id)
     assert again.request.views == 1
@@ -84,8 +84,8 @@ def test_a_scan_can_be_taken_up_again_and_forgotten(robot: RobotClient, samples:
         robot.open_scan(begun.id)
 
 
-def test_an_answer_is_corrected_and_scans_in_progress_are_listed(robot: RobotClient, samples: list[Sequence]) -> None:
-    burst = load_burst(samples[0], range(2))
+def test_an_answer_is_corrected_and_scans_in_progress_are_listed(robot: RobotClient, recordings: list[Sequence]) -> None:
+    burst = load_burst(recordings[0], range(2))
     seen = robot.observe(burst)
     assert seen.scan is not None
     assert [scan.id for scan in robot.scans()] == [seen.scan.id]
@@ -94,8 +94,8 @@ def test_an_answer_is_corrected_and_scans_in_progress_are_listed(robot: RobotCli
     assert robot.category(corrected.corrected_to).name == "bug"
 
 
-def test_pictures_are_png(robot: RobotClient, samples: list[Sequence]) -> None:
-    seen = robot.observe(load_burst(samples[0], range(2)))
+def test_pictures_are_png(robot: RobotClient, recordings: list[Sequence]) -> None:
+    seen = robot.observe(load_burst(recordings[0], range(2)))
     assert robot.picture(f"/v1/observations/{seen.id}/foreground.png", view=1).startswith(b"\x89PNG")
 
 
@@ -117,11 +117,11 @@ def test_the_service_names_problems_as_the_client_does() -> None:
     assert {f"{errors.PROBLEM_URN}{name}" for _, _, name, _ in KINDS} | {unexpected} == set(errors.PROBLEMS)
 
 
-def test_a_wrong_field_of_a_real_burst_is_named(robot: RobotClient, samples: list[Sequence]) -> None:
+def test_a_wrong_field_of_a_real_burst_is_named(robot: RobotClient, recordings: list[Sequence]) -> None:
     with pytest.raises(errors.InvalidInputProblem, match="views_used"):
-        robot.observe(load_burst(samples[0], range(2)), views_used=3)
+        robot.observe(load_burst(recordings[0], range(2)), views_used=3)
     with pytest.raises(errors.NotFoundProblem):
-        robot.observe(load_burst(samples[0], range(2)), category_id="nobody")
+        robot.observe(load_burst(recordings[0], range(2)), category_id="nobody")
 
 
 def test_another_server_is_told_from_the_service() -> None:

@@ -10,26 +10,10 @@ import pytest
 from clients import errors
 from clients.answers import Category
 from clients.asynchronous import AsyncRobotClient
-from clients.datasets.folders import Sequence, load_burst
 from clients.events import Event, EventReader
 from clients.robot import RobotClient
 from core.errors import InvalidInput
 from core.views import Burst, View
-
-
-@pytest.fixture
-def burst(samples: list[Sequence]) -> Burst:
-    """Four views of a car."""
-    return load_burst(samples[0], range(4))
-
-
-@pytest.fixture
-def learnt(robot: RobotClient, burst: Burst) -> Category:
-    """The category that it makes."""
-    scan = robot.scan(burst)
-    for view in burst.views:
-        scan.add(view)
-    return scan.complete("car")
 
 
 def test_lines_make_events() -> None:
@@ -68,7 +52,7 @@ def test_an_object_is_followed(robot: RobotClient, learnt: Category, burst: Burs
     assert last.category_id == learnt.id
     assert last.pose is not None
     np.testing.assert_allclose(last.pose.target_from_reference.as_matrix(), np.eye(4), atol=0.05)
-    assert last.pose.object_in_world.shape == (4, 4)
+    assert last.pose.world_from_object.shape == (4, 4)
     assert "found" in {change for answer in answers for change in answer.changes}
 
 

@@ -18,10 +18,10 @@ from clients.simulator.world import Subject
 
 
 @pytest.fixture
-def two(samples: list[Sequence]) -> dict[str, Sequence]:
+def two(recordings: list[Sequence]) -> dict[str, Sequence]:
     """An object of each of two categories."""
-    first = samples[0]
-    return {each.category: each for each in (first, next(each for each in samples if each.category != first.category))}
+    first = recordings[0]
+    return {each.category: each for each in (first, next(each for each in recordings if each.category != first.category))}
 
 
 def test_a_robot_that_answers_well_is_taught_all(robot: RobotClient, two: dict[str, Sequence]) -> None:
@@ -35,9 +35,9 @@ def test_a_robot_that_answers_well_is_taught_all(robot: RobotClient, two: dict[s
     assert summary.instances_a_category == 1
 
 
-def test_wrong_answers_are_corrected_until_patience_ends(robot: RobotClient, samples: list[Sequence]) -> None:
+def test_wrong_answers_are_corrected_until_patience_ends(robot: RobotClient, recordings: list[Sequence]) -> None:
     """Each object is another one, which this backbone never recognises; a corrected burst joins its category."""
-    pool = [each for each in samples if each.category == samples[0].category]
+    pool = [each for each in recordings if each.category == recordings[0].category]
     lessons = Lessons(
         robot, lambda category, index: ReplaySubject(pool[index]), [pool[0].category], Conduct(views=6), TeacherConfig(patience=2)
     )
@@ -66,8 +66,8 @@ def test_interrupted_lessons_go_on_where_they_stopped(robot: RobotClient, two: d
     assert (again.summary.categories_learnt, again.summary.questions) == (2, 3)
 
 
-def test_a_teacher_without_objects_says_so(robot: RobotClient, samples: list[Sequence]) -> None:
-    lessons = Lessons(robot, lambda category, index: [ReplaySubject(samples[0])][index], [samples[0].category], Conduct(views=6))
+def test_a_teacher_without_objects_says_so(robot: RobotClient, recordings: list[Sequence]) -> None:
+    lessons = Lessons(robot, lambda category, index: [ReplaySubject(recordings[0])][index], [recordings[0].category], Conduct(views=6))
     assert len(list(lessons)) == 1
     assert lessons.summary.ended == "no more objects"
 
@@ -89,7 +89,7 @@ def test_robots_at_once_leave_the_memory_as_they_made_it(url: str, two: dict[str
         assert "nobody learnt it" in disagreements(first, [each for each in met if not each.learnt])[0]
 
 
-def test_what_stops_one_robot_is_raised_when_all_have_ended(url: str, samples: list[Sequence], tmp_path: Path) -> None:
+def test_what_stops_one_robot_is_raised_when_all_have_ended(url: str, recordings: list[Sequence], tmp_path: Path) -> None:
     class Broken:
         category, name = "none", "none/0"
 
@@ -97,6 +97,6 @@ def test_what_stops_one_robot_is_raised_when_all_have_ended(url: str, samples: l
             raise ClientError("the world broke")
 
     with RobotClient(url) as robot:
-        episodes = [Episode(robot, [ReplaySubject(samples[0])], Conduct(views=3)), Episode(robot, [Broken()], Conduct(), number=1)]  # type: ignore[list-item]
+        episodes = [Episode(robot, [ReplaySubject(recordings[0])], Conduct(views=3)), Episode(robot, [Broken()], Conduct(), number=1)]  # type: ignore[list-item]
         with pytest.raises(ClientError, match="the world broke"):
             list(together(episodes))

@@ -36,7 +36,7 @@ class Answer:
 
     def __init__(self, number: int) -> None:
         self.id, self.category_id, self.pose_error = f"o{number}", "c", None
-        self.pose = type("P", (), {"object_in_world": CENTERED, "extent_m": np.full(3, 0.1), "matrix": Sim3.identity().as_matrix()})()
+        self.pose = type("P", (), {"world_from_object": CENTERED, "extent_m": np.full(3, 0.1), "matrix": Sim3.identity().as_matrix()})()
 
 
 CENTERED = np.eye(4)
@@ -107,9 +107,9 @@ def test_where_there_is_no_pose_there_is_nothing_to_aim_at() -> None:
 
 
 def test_an_episode_keeps_the_pose_of_every_waypoint_and_learns_nothing_from_them(
-    robot: RobotClient, samples: list[Sequence], tmp_path: Path, record: EpisodeRecord
+    robot: RobotClient, recordings: list[Sequence], tmp_path: Path, record: EpisodeRecord
 ) -> None:
-    encounters = list(Episode(robot, [ReplaySubject(samples[0])] * 2, Conduct(views=12, waypoints=3)))
+    encounters = list(Episode(robot, [ReplaySubject(recordings[0])] * 2, Conduct(views=12, waypoints=3)))
     new, again = encounters
     assert (new.verdict, again.verdict) == (Verdict.NEW, Verdict.RECOGNISED)
     assert new.waypoints == ()

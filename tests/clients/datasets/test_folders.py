@@ -15,23 +15,23 @@ from clients.datasets.folders import Sequence, find_sequences, load_burst
 from core.errors import InvalidInput
 
 
-def test_samples_are_enough_for_the_demo(samples: list[Sequence]) -> None:
-    instances = Counter(sequence.category for sequence in samples)
+def test_samples_are_enough_for_the_demo(recordings: list[Sequence]) -> None:
+    instances = Counter(sequence.category for sequence in recordings)
     assert len(instances) >= 5
-    assert len(samples) >= 14
+    assert len(recordings) >= 14
     assert min(instances.values()) >= 2
-    assert min(len(sequence.images) for sequence in samples) >= 10
+    assert min(len(sequence.images) for sequence in recordings) >= 10
 
 
-def test_samples_are_small(samples: list[Sequence]) -> None:
-    root = samples[0].path.parents[1]
+def test_samples_are_small(recordings: list[Sequence]) -> None:
+    root = recordings[0].path.parents[1]
     assert sum(file.stat().st_size for file in root.rglob("*") if file.is_file()) < 8_000_000
 
 
-def test_the_true_box_projects_around_the_silhouette(samples: list[Sequence]) -> None:
+def test_the_true_box_projects_around_the_silhouette(recordings: list[Sequence]) -> None:
     """K, extrinsics, model pose and the shrunk images agree: a wrong half pixel would not show, a wrong convention would."""
     corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) / (2 * np.sqrt(3))
-    for sequence in samples:
+    for sequence in recordings:
         view = load_burst(sequence, [0], masks=True).views[0]
         assert view.mask is not None
         assert view.camera is not None
@@ -47,9 +47,9 @@ def test_the_true_box_projects_around_the_silhouette(samples: list[Sequence]) ->
         assert abs(np.median(measured) - depth) < sequence.world_from_model.scale / 2, sequence.name
 
 
-def test_points_on_the_object_agree_between_views(samples: list[Sequence]) -> None:
+def test_points_on_the_object_agree_between_views(recordings: list[Sequence]) -> None:
     """Depth under the silhouette, back-projected, lies inside the model's unit ball."""
-    for sequence in samples:
+    for sequence in recordings:
         view = load_burst(sequence, [0], masks=True).views[0]
         assert view.camera is not None
         assert view.depth_m is not None
@@ -61,8 +61,8 @@ def test_points_on_the_object_agree_between_views(samples: list[Sequence]) -> No
         assert np.quantile(distances, 0.9) < 0.55, sequence.name
 
 
-def test_masks_are_given_only_when_asked_for(samples: list[Sequence]) -> None:
-    assert load_burst(samples[0], [0]).views[0].mask is None
+def test_masks_are_given_only_when_asked_for(recordings: list[Sequence]) -> None:
+    assert load_burst(recordings[0], [0]).views[0].mask is None
 
 
 def test_a_folder_without_sequences_is_named(tmp_path: Path) -> None:
@@ -86,8 +86,8 @@ def with_symmetries(sequence: Sequence, folder: Path, symmetries: object) -> Pat
 @pytest.mark.parametrize(
     "symmetry", [QUARTER_TURN, np.ravel(QUARTER_TURN).tolist(), BOP_QUARTER_TURN, np.reshape(BOP_QUARTER_TURN, (4, 4)).tolist()]
 )
-def test_a_symmetry_is_read_in_either_form(samples: list[Sequence], tmp_path: Path, symmetry: object) -> None:
-    (sequence,) = find_sequences(with_symmetries(samples[0], tmp_path, [symmetry]))
+def test_a_symmetry_is_read_in_either_form(recordings: list[Sequence], tmp_path: Path, symmetry: object) -> None:
+    (sequence,) = find_sequences(with_symmetries(recordings[0], tmp_path, [symmetry]))
     np.testing.assert_array_equal(sequence.symmetries, [QUARTER_TURN])
 
 
@@ -101,19 +101,19 @@ def test_a_symmetry_is_read_in_either_form(samples: list[Sequence], tmp_path: Pa
         (np.ravel(2 * np.eye(3)).tolist(), "is not a rotation"),
     ],
 )
-def test_a_symmetry_that_is_none_is_named(samples: list[Sequence], tmp_path: Path, symmetry: object, says: str) -> None:
-    folder = with_symmetries(samples[0], tmp_path, [QUARTER_TURN, symmetry])
+def test_a_symmetry_that_is_none_is_named(recordings: list[Sequence], tmp_path: Path, symmetry: object, says: str) -> None:
+    folder = with_symmetries(recordings[0], tmp_path, [QUARTER_TURN, symmetry])
     with pytest.raises(InvalidInput, match=says) as caught:
         find_sequences(folder)
     assert caught.value.field == f"{folder / 'sequence.json'}: symmetries[1]"
 
 
-def test_linked_folders_are_followed_once(samples: list[Sequence], tmp_path: Path) -> None:
+def test_linked_folders_are_followed_once(recordings: list[Sequence], tmp_path: Path) -> None:
     chosen = tmp_path / "chosen"
     chosen.mkdir()
-    (chosen / "category").symlink_to(samples[0].path.parent, target_is_directory=True)
-    (chosen / "again").symlink_to(samples[0].path, target_is_directory=True)
+    (chosen / "category").symlink_to(recordings[0].path.parent, target_is_directory=True)
+    (chosen / "again").symlink_to(recordings[0].path, target_is_directory=True)
     (chosen / "up").symlink_to(os.pardir, target_is_directory=True)
     found = find_sequences(chosen)
-    assert sorted(sequence.name for sequence in found) == [each.name for each in samples if each.category == samples[0].category]
+    assert sorted(sequence.name for sequence in found) == [each.name for each in recordings if each.category == recordings[0].category]
     assert all(load_burst(sequence, [0]).views for sequence in found)

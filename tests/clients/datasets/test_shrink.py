@@ -15,10 +15,10 @@ from core.errors import InvalidInput
 TINY = ShrinkConfig(categories=1, instances=1, views=3, side=160)
 
 
-def test_a_copy_keeps_geometry_and_ground_truth(samples: list[Sequence], tmp_path: Path) -> None:
-    names = shrink(samples[0].path.parents[1], tmp_path / "small", TINY)
+def test_a_copy_keeps_geometry_and_ground_truth(recordings: list[Sequence], tmp_path: Path) -> None:
+    names = shrink(recordings[0].path.parents[1], tmp_path / "small", TINY)
     small = find_sequences(tmp_path / "small")[0]
-    original = next(sequence for sequence in samples if [sequence.name] == names)
+    original = next(sequence for sequence in recordings if [sequence.name] == names)
     assert small.world_from_model is not None
     assert original.world_from_model is not None
     point = original.world_from_model.translation
@@ -39,15 +39,15 @@ def test_a_copy_keeps_geometry_and_ground_truth(samples: list[Sequence], tmp_pat
         assert (np.abs(neighbours - view.depth_m).min(axis=0) <= 2 * step).all()
 
 
-def test_the_draw_depends_on_the_seed_alone(samples: list[Sequence]) -> None:
+def test_the_draw_depends_on_the_seed_alone(recordings: list[Sequence]) -> None:
     config = ShrinkConfig(categories=3, instances=2)
-    names = [[each.name for each in draw(list(order), config, random.Random(4))] for order in (samples, samples)]
+    names = [[each.name for each in draw(list(order), config, random.Random(4))] for order in (recordings, recordings)]
     assert names[0] == names[1]
     assert len(names[0]) == 6
 
 
-def test_too_few_objects_and_a_used_folder_are_refused(samples: list[Sequence], tmp_path: Path) -> None:
-    data = samples[0].path.parents[1]
+def test_too_few_objects_and_a_used_folder_are_refused(recordings: list[Sequence], tmp_path: Path) -> None:
+    data = recordings[0].path.parents[1]
     with pytest.raises(InvalidInput, match="3 objects or more; 50 are asked for"):
         shrink(data, tmp_path / "new", ShrinkConfig(categories=50))
     (tmp_path / "file").touch()

@@ -13,9 +13,9 @@ from clients.datasets.sources import FORMATS, find_sequences
 from core.errors import InvalidInput
 
 
-def test_a_folder_alone_is_in_the_data_layout(samples: list[Sequence]) -> None:
-    root = samples[0].path.parents[1]
-    names = [each.name for each in samples]
+def test_a_folder_alone_is_in_the_data_layout(recordings: list[Sequence]) -> None:
+    root = recordings[0].path.parents[1]
+    names = [each.name for each in recordings]
     assert [each.name for each in find_sequences(root)] == [each.name for each in find_sequences(str(root))] == names
 
 
