@@ -34,7 +34,7 @@ def burst_parts(burst: Burst, frame: str | None = None) -> list[Part]:
     if _all_or_none("depth", [view.depth_m for view in views]):
         parts += [_image("depth", index, encode_depth(view, index)) for index, view in enumerate(views)]
     if _all_or_none("mask", [view.mask for view in views]):
-        parts += [_image("mask", index, encode_png(np.asarray(view.mask, dtype=np.uint8) * 255)) for index, view in enumerate(views)]
+        parts += [_image("mask", index, encode_mask(view)) for index, view in enumerate(views)]
     return parts
 
 
@@ -74,6 +74,11 @@ def _image(field: str, index: int, content: bytes) -> Part:
 def encode_colour(view: View) -> bytes:
     """A view's colour as JPEG."""
     return bytes(simplejpeg.encode_jpeg(np.ascontiguousarray(view.rgb), quality=JPEG_QUALITY, colorsubsampling="420"))
+
+
+def encode_mask(view: View) -> bytes:
+    """A view's silhouette as an 8-bit PNG: 255 on the object."""
+    return encode_png(np.asarray(view.mask, dtype=np.uint8) * 255)
 
 
 def encode_depth(view: View, index: int) -> bytes:

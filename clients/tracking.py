@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from clients.answers import Outcome, sim3_from_json
+from clients.calls.call import given
 from clients.errors import problem_from_json
-from clients.multipart import DEPTH_UNIT_M, encode_colour, encode_depth
-from clients.png import encode_png
+from clients.multipart import DEPTH_UNIT_M, encode_colour, encode_depth, encode_mask
 from core.errors import InvalidInput
 from core.sim3 import Sim3
 from core.views import FloatArray, View
@@ -69,7 +69,7 @@ class Conversation:
 
     def hello(self, **options: Any) -> str:
         """The first message; without options that are None."""
-        return json.dumps({"type": "hello", **{name: value for name, value in options.items() if value is not None}})
+        return json.dumps({"type": "hello", **given(**options)})
 
     def frame(self, view: View, time_s: float | None = None) -> str:
         """The message of one view. Raises InvalidInput where it has no depth or no camera."""
@@ -88,7 +88,7 @@ class Conversation:
             "depth": _base64(encode_depth(view, self._next)),
         }
         if view.mask is not None:
-            message["mask"] = _base64(encode_png(np.asarray(view.mask, dtype=np.uint8) * 255))
+            message["mask"] = _base64(encode_mask(view))
         self._next += 1
         return json.dumps(message)
 

@@ -110,26 +110,17 @@ class Episode:
         observe_ms = (time.perf_counter() - started) * 1e3
         founder = self._truth.founder(seen.category_id)
         verdict = judge(seen.outcome, thing.category, founder, in_memory)
-        learnt, scan_ms, failure = None, None, seen.pose_error or seen.scan_error
-        report = ScanReport()
-        if seen.scan is not None:
-            started = time.perf_counter()
-            learnt, failure = _carry_out(seen, arm, report)
-            scan_ms = (time.perf_counter() - started) * 1e3
+
+        def error(answer: Observation) -> PoseError | None:
+            return _error(answer, founder, thing) if verdict is Verdict.RECOGNISED else None
+
+        scanned = _scanned(seen, arm)
+        learnt = scanned.learnt
         if learnt is not None:
             self._truth.add(learnt.id, Founder.of(thing))
-        recognised = verdict is Verdict.RECOGNISED
         visit = Visit()
         if seen.outcome == "known" and self._conduct.waypoints:
-            visit = visit_waypoints(
-                self._robot,
-                arm,
-                seen,
-                burst,
-                self._conduct.waypoints,
-                chance.randrange(1 << 16),
-                lambda answer: _error(answer, founder, thing) if recognised else None,
-            )
+            visit = visit_waypoints(self._robot, arm, seen, burst, self._conduct.waypoints, chance.randrange(1 << 16), error)
         most_similar = seen.similarities[0] if seen.similarities else None
         nearest = self._truth.founder(most_similar.category_id) if most_similar else None
         return Encounter(
@@ -146,7 +137,7 @@ class Episode:
             threshold=seen.threshold,
             in_memory=in_memory,
             has_truth=thing.world_from_model is not None,
-            error=_error(seen, founder, thing) if recognised else None,
+            error=error(seen),
             learnt=learnt.id if learnt else None,
             learnt_views=learnt.views if learnt else 0,
             founder_matrix=thing.world_from_model.as_matrix().tolist() if learnt and thing.world_from_model else None,
@@ -154,11 +145,11 @@ class Episode:
             views=len(burst),
             looks=looks,
             offsets_deg=tuple(arm.offsets_deg),
-            refused=arm.refused + len(report.out_of_reach),
-            view_faults=tuple(report.faults),
-            failure=failure,
+            refused=arm.refused + len(scanned.report.out_of_reach),
+            view_faults=tuple(scanned.report.faults),
+            failure=scanned.failure,
             observe_ms=observe_ms,
-            scan_ms=scan_ms,
+            scan_ms=scanned.ms,
             motion_s=arm.clock_s,
             timings_ms=dict(seen.timings_ms),
             robot=self._number,
@@ -203,13 +194,27 @@ def _nothing_seen(problem: NoObjectProblem) -> Observation:
     return Observation("", "uncertain", None, None, None, str(problem), None, None, (), None, {"total": 0.0}, {})
 
 
-def _carry_out(seen: Observation, arm: Arm, report: ScanReport) -> tuple[Category | None, str | None]:
-    """The category made, or why none was."""
-    assert seen.scan is not None
+@dataclass(frozen=True)
+class _Scanned:
+    """What came of an answer's scan, where it asked for one."""
+
+    learnt: Category | None
+    failure: str | None
+    """Why there is no category, or no pose."""
+    ms: float | None
+    report: ScanReport
+
+
+def _scanned(seen: Observation, arm: Arm) -> _Scanned:
+    report = ScanReport()
+    if seen.scan is None:
+        return _Scanned(None, seen.pose_error or seen.scan_error, None, report)
+    learnt, failure, started = None, None, time.perf_counter()
     try:
-        return carry_out(arm, seen.scan, report=report), None
+        learnt = carry_out(arm, seen.scan, report=report)
     except COULD_NOT as problem:
-        return None, str(problem)
+        failure = str(problem)
+    return _Scanned(learnt, failure, (time.perf_counter() - started) * 1e3, report)
 
 
 def _error(seen: Observation, founder: Founder | None, thing: WorldObject) -> PoseError | None:

@@ -123,7 +123,20 @@ class Rearrangement:
             if category not in self._goals:
                 self._show_goal(category)
         except COULD_NOT as problem:
-            return Trial(number, "", category, "", False, None, None, None, None, f"no goal: {problem}", 0.0, time.perf_counter() - started)
+            return Trial(
+                number=number,
+                name="",
+                category=category,
+                reference="",
+                recognised=False,
+                rotation_deg=None,
+                position_m=None,
+                start_rotation_deg=None,
+                start_position_m=None,
+                failure=f"no goal: {problem}",
+                motion_s=0.0,
+                seconds=time.perf_counter() - started,
+            )
         goal_id, category_id, goal, reference = self._goals[category]
         model = RECIPES[category].make(category, self._seed * 1000 + number)
         world = self._world(number)

@@ -13,8 +13,6 @@ from core.views import FloatArray
 
 REPLACEMENTS = 4
 """How often viewpoints that nothing comes near to are given back for other ones."""
-
-
 MOST_AGAIN = 3
 """Views taken once more: where all are poor, as of an object of another size than was thought, other viewpoints do not help."""
 

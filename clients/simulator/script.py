@@ -21,6 +21,8 @@ from core.errors import InvalidInput
 
 WORLDS = ("raycast", "replay")
 ORDERS = ("random", "grouped")
+DRAWN_CATEGORIES = 5
+"""Where a script names none."""
 ROBOT_SEEDS = 1_000
 """Between the seeds of robots that share a memory."""
 
@@ -111,9 +113,6 @@ class Script:
             raise InvalidInput("categories", f"{', '.join(sorted(unknown))}: not in the recordings, which have {', '.join(groups)}")
         chosen = self.categories or tuple(groups)
         return [ReplaySubject(sequence) for category in chosen for sequence in groups[category][: self.instances]]
-
-
-DRAWN_CATEGORIES = 5
 
 
 def read_script(file: Path) -> Script:

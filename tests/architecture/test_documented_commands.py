@@ -49,7 +49,7 @@ def test_an_option_that_there_is_not_is_refused() -> None:
 
 def test_lines_are_found_in_blocks_and_in_sentences() -> None:
     assert len(LINES) > 60
-    assert {"scan tests/data/bursts/cup/cup_1 --name cup", "observe FOLDER --format bop"} <= set(LINES)
+    assert {"scan tests/data/bursts/microwave/microwave_0 --name microwave", "observe FOLDER --format bop"} <= set(LINES)
 
 
 @pytest.mark.parametrize("target", TARGETS)
