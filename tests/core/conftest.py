@@ -42,6 +42,15 @@ class PaintedObject:
         poses[:, :3, :3] = world_from_object.rotation @ poses[:, :3, :3]
         return EncodedBurst(tuple(self._view(Camera(K, pose), world_from_object) for pose in poses), "painted")
 
+    def with_tokens(self, tokens: np.ndarray) -> EncodedBurst:
+        """A burst that shows these patches, shape (V, K, D); where they are matters to nobody who asks for it."""
+        view, cells = self.encode(1).views[0], np.zeros((tokens.shape[1], 2), np.int16)
+        made = (
+            replace(view, cells=cells, descriptors=each.astype(np.float32), pooled=each.mean(axis=0), cls=each.mean(axis=0))
+            for each in tokens
+        )
+        return EncodedBurst(tuple(made), "painted")
+
     def _view(self, camera: Camera, world_from_object: Sim3) -> EncodedView:
         world = world_from_object.apply(self.points)
         pixels, depth = camera.project(world)

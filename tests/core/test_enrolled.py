@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -67,17 +66,7 @@ def one_each(kinds: int) -> Kept:
 
 @pytest.fixture
 def seen(painted: PaintedObject) -> Callable[[int, int], EncodedBurst]:
-    view = painted.encode(1).views[0]
-    cells = np.zeros((PATCHES, 2), np.int16)
-
-    def burst(kind: int, seed: int) -> EncodedBurst:
-        views = [
-            replace(view, cells=cells, descriptors=each.astype(np.float32), pooled=each.mean(axis=0), cls=each.mean(axis=0))
-            for each in tokens(kind, seed)
-        ]
-        return EncodedBurst(tuple(views), "painted")
-
-    return burst
+    return lambda kind, seed: painted.with_tokens(tokens(kind, seed))
 
 
 def same(kept: Kept, enrolled: Enrolled, burst: EncodedBurst) -> None:

@@ -17,8 +17,8 @@ from .conftest import PaintedObject
 
 
 def burst_of(painted: PaintedObject, tokens: np.ndarray) -> EncodedBurst:
-    view = painted.encode(1).views[0]
-    return EncodedBurst(tuple(replace(view, cls=token, pooled=token) for token in tokens.astype(np.float32)), "painted")
+    """One view for each token, shape (V, D)."""
+    return painted.with_tokens(tokens[:, None])
 
 
 def test_an_empty_memory_finds_everything_novel(painted: PaintedObject) -> None:
@@ -60,13 +60,7 @@ def member(kind: int, seed: int) -> Member:
 
 
 def seen(painted: PaintedObject, kind: int, seed: int, views: int = 4) -> EncodedBurst:
-    view = painted.encode(1).views[0]
-    cells = np.zeros((PATCHES, 2), np.int16)
-    made = [
-        replace(view, cells=cells, descriptors=each.astype(np.float32), pooled=each.mean(axis=0), cls=each.mean(axis=0))
-        for each in kind_of_tokens(kind, seed, views)
-    ]
-    return EncodedBurst(tuple(made), "painted")
+    return painted.with_tokens(kind_of_tokens(kind, seed, views))
 
 
 SIX_KINDS = [member(kind, seed) for kind in range(6) for seed in range(2)]

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import io
 import json
+import shutil
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -20,6 +22,7 @@ from core.views import Burst
 from service.app import create_app
 from service.settings import Settings
 
+LONG_S = 60.0
 HALF_AXES_M = np.array([0.10, 0.07, 0.05])
 COLOURS = {"bright": (190, 60), "dark": (80, 40)}
 """Middle and amplitude of the colours of two kinds of object."""
@@ -66,6 +69,14 @@ def colour_only(about: dict[str, Any], files: dict[str, list[bytes]]) -> None:
     files["depth"].clear()
 
 
+def until(what: Callable[[], object]) -> None:
+    """Waits for it."""
+    end = time.monotonic() + LONG_S
+    while not what():
+        assert time.monotonic() < end, "it never came"
+        time.sleep(0.01)
+
+
 def png(image: np.ndarray) -> bytes:
     """An image as a file."""
     return cv2.imencode(".png", image)[1].tobytes()
@@ -89,10 +100,18 @@ def npz() -> Callable[..., bytes]:
     return pack
 
 
+def small_service(folder: Path) -> Settings:
+    """Settings of one whose memory is there."""
+    return Settings(data_dir=folder, max_views=12, max_upload_mb=8, variant="ucd", score="pooled_best_view")
+
+
 @pytest.fixture
-def settings(tmp_path: Path) -> Settings:
-    """Settings of a small service in a temporary folder."""
-    return Settings(data_dir=tmp_path / "memory", max_views=12, max_upload_mb=8, variant="ucd", score="pooled_best_view")
+def settings(tmp_path: Path, request: pytest.FixtureRequest) -> Settings:
+    """Settings of a small service in a temporary folder, whose memory is empty unless the test asks for `ball`."""
+    settings = small_service(tmp_path / "memory")
+    if "ball" in request.fixturenames:
+        shutil.copytree(request.getfixturevalue("ball_memory")[0], settings.data_dir)
+    return settings
 
 
 @pytest.fixture
@@ -106,21 +125,30 @@ def client(settings: Settings, backbone: Backbone) -> Iterator[TestClient]:
 def learn(client: TestClient, look: Any, parts: Any) -> Callable[..., dict[str, Any]]:
     """learn(kind, name): observes, scans and completes; answers the category."""
 
-    def category(kind: str = "bright", name: str | None = None) -> dict[str, Any]:
-        burst = look(kind)
-        scan = client.post("/v1/observations", files=parts(burst)).json()["scan"]
-        assert client.post(f"/v1/scans/{scan['id']}/views", files=parts(burst)).status_code == 200
-        answer = client.post(f"/v1/scans/{scan['id']}/complete", json={"name": name})
-        assert answer.status_code == 201, answer.text
-        return answer.json()
+    return lambda kind="bright", name=None: learnt(client, parts(look(kind)), name)
 
-    return category
+
+def learnt(client: TestClient, burst: Any, name: str | None) -> dict[str, Any]:
+    """The category that a burst is observed, scanned and completed to."""
+    scan = client.post("/v1/observations", files=burst).json()["scan"]
+    assert client.post(f"/v1/scans/{scan['id']}/views", files=burst).status_code == 200
+    answer = client.post(f"/v1/scans/{scan['id']}/complete", json={"name": name})
+    assert answer.status_code == 201, answer.text
+    return answer.json()
+
+
+@pytest.fixture(scope="session")
+def ball_memory(tmp_path_factory: Any, colour_backbone: Any, look: Any, parts: Any) -> tuple[Path, dict[str, Any]]:
+    """A memory that learnt a ball, to be copied, since learning takes half a second; and that category."""
+    folder = tmp_path_factory.mktemp("ball") / "memory"
+    with TestClient(create_app(small_service(folder), backbone=colour_backbone)) as client:
+        return folder, learnt(client, parts(look("bright")), "ball")
 
 
 @pytest.fixture
-def ball(learn: Callable[..., dict[str, Any]]) -> dict[str, Any]:
-    """A category."""
-    return learn("bright", "ball")
+def ball(ball_memory: tuple[Path, dict[str, Any]]) -> dict[str, Any]:
+    """A category that the service knows from its start."""
+    return ball_memory[1]
 
 
 @pytest.fixture

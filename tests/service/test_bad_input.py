@@ -246,11 +246,10 @@ def test_an_array_shorter_than_its_header_says(client):
     refused(post_npz(client, body.getvalue()), 422, "rgb", "cannot be read")
 
 
-def test_json_bodies_are_checked_too(client, learn):
-    category = learn()
-    refused(client.patch(f"/v1/categories/{category['id']}", json={"name": ""}), 422, "name", "at least 1 character")
+def test_json_bodies_are_checked_too(client, ball):
+    refused(client.patch(f"/v1/categories/{ball['id']}", json={"name": ""}), 422, "name", "at least 1 character")
     refused(
-        client.patch(f"/v1/categories/{category['id']}", content=b"{", headers={"content-type": "application/json"}),
+        client.patch(f"/v1/categories/{ball['id']}", content=b"{", headers={"content-type": "application/json"}),
         422,
         "body",
         "is not JSON",

@@ -40,9 +40,8 @@ def test_its_extent_is_about_the_object_s(learn):
     assert extent[2] > 0.17
 
 
-def test_a_view_comes_back_as_it_was_sent(client, look, learn):
-    category = learn()
-    shown = picture(client.get(f"/v1/categories/{category['id']}/views/2/rgb.png"))
+def test_a_view_comes_back_as_it_was_sent(client, look, ball):
+    shown = picture(client.get(f"/v1/categories/{ball['id']}/views/2/rgb.png"))
     assert np.array_equal(shown[..., ::-1], look().views[2].rgb)
 
 
@@ -129,12 +128,11 @@ def test_a_view_is_a_number(client, learn):
     assert (answer.status_code, answer.json()["field"]) == (422, "view")
 
 
-def test_its_instances_say_where_they_came_from(client, look, parts, learn):
-    category = learn()
+def test_its_instances_say_where_they_came_from(client, look, parts, ball):
     seen = client.post("/v1/observations", files=parts(look(views=4))).json()
     client.post("/v1/observations", files=parts(look(views=3)), params={"learn": False})
-    client.post("/v1/observations", files=parts(look("dark", views=3)), params={"category_id": category["id"]})
-    instances = client.get(f"/v1/categories/{category['id']}/instances").json()["instances"]
+    client.post("/v1/observations", files=parts(look("dark", views=3)), params={"category_id": ball["id"]})
+    instances = client.get(f"/v1/categories/{ball['id']}/instances").json()["instances"]
     assert [(each["how"], each["views"], each["kept"]) for each in instances] == [
         ("scan", 6, True),
         ("decision", 4, True),
@@ -144,20 +142,18 @@ def test_its_instances_say_where_they_came_from(client, look, parts, learn):
     assert instances[1]["similarity"] == pytest.approx(seen["similarities"][0]["similarity"])
 
 
-def test_a_burst_recognised_wrongly_is_taken_out_again(client, look, parts, learn):
-    category = learn()
-    client.post("/v1/observations", files=parts(look("dark")), params={"category_id": category["id"]})
-    path = f"/v1/categories/{category['id']}/instances"
+def test_a_burst_recognised_wrongly_is_taken_out_again(client, look, parts, ball):
+    client.post("/v1/observations", files=parts(look("dark")), params={"category_id": ball["id"]})
+    path = f"/v1/categories/{ball['id']}/instances"
     wrong = client.get(path).json()["instances"][-1]
     assert client.delete(f"{path}/{wrong['id']}").status_code == 204
-    assert client.get(f"/v1/categories/{category['id']}").json()["instances"] == 1
+    assert client.get(f"/v1/categories/{ball['id']}").json()["instances"] == 1
     assert client.delete(f"{path}/{wrong['id']}").status_code == 404
     assert client.post("/v1/observations", files=parts(look("dark"))).json()["outcome"] == "novel"
 
 
-def test_the_last_burst_stays(client, learn):
-    category = learn()
-    path = f"/v1/categories/{category['id']}/instances"
+def test_the_last_burst_stays(client, ball):
+    path = f"/v1/categories/{ball['id']}/instances"
     (only,) = client.get(path).json()["instances"]
     assert client.delete(f"{path}/{only['id']}").status_code == 409
 
@@ -171,35 +167,32 @@ def test_merging_moves_the_bursts_and_ends_the_other(client, look, parts, learn)
 
 
 @pytest.mark.parametrize(("source", "status"), [("itself", 422), ("nope", 404)])
-def test_what_cannot_be_merged(client, learn, source, status):
-    category = learn()
-    body = {"from": category["id"] if source == "itself" else source}
-    assert client.post(f"/v1/categories/{category['id']}/merge", json=body).status_code == status
+def test_what_cannot_be_merged(client, ball, source, status):
+    body = {"from": ball["id"] if source == "itself" else source}
+    assert client.post(f"/v1/categories/{ball['id']}/merge", json=body).status_code == status
 
 
-def test_splitting_undoes_a_wrong_assignment(client, look, parts, learn):
-    category = learn("bright", "ball")
-    client.post("/v1/observations", files=parts(look("dark")), params={"category_id": category["id"]})
-    instances = client.get(f"/v1/categories/{category['id']}/instances").json()["instances"]
-    split = client.post(f"/v1/categories/{category['id']}/split", json={"instance_ids": [instances[1]["id"]], "name": "stone"})
+def test_splitting_undoes_a_wrong_assignment(client, look, parts, ball):
+    client.post("/v1/observations", files=parts(look("dark")), params={"category_id": ball["id"]})
+    instances = client.get(f"/v1/categories/{ball['id']}/instances").json()["instances"]
+    split = client.post(f"/v1/categories/{ball['id']}/split", json={"instance_ids": [instances[1]["id"]], "name": "stone"})
     assert split.status_code == 201, split.text
     assert (split.json()["name"], split.json()["instances"], split.json()["views"]) == ("stone", 1, 6)
     seen = client.post("/v1/observations", files=parts(look("dark"))).json()
     assert (seen["category_id"], seen["pose"] is not None) == (split.json()["id"], True)
-    assert client.post("/v1/observations", files=parts(look())).json()["category_id"] == category["id"]
+    assert client.post("/v1/observations", files=parts(look())).json()["category_id"] == ball["id"]
 
 
-def test_what_cannot_be_split(client, look, parts, learn):
-    category = learn()
-    path = f"/v1/categories/{category['id']}/split"
-    (first,) = client.get(f"/v1/categories/{category['id']}/instances").json()["instances"]
+def test_what_cannot_be_split(client, look, parts, ball):
+    path = f"/v1/categories/{ball['id']}/split"
+    (first,) = client.get(f"/v1/categories/{ball['id']}/instances").json()["instances"]
     whole = client.post(path, json={"instance_ids": [first["id"]]})
     assert (whole.status_code, whole.json()["field"]) == (422, "instance_ids")
     unknown = client.post(path, json={"instance_ids": ["nope"]})
     assert (unknown.status_code, unknown.json()["field"]) == (422, "instance_ids[0]")
 
-    client.post("/v1/observations", files=parts(look(), colour_only), params={"category_id": category["id"]})
-    photographs = client.get(f"/v1/categories/{category['id']}/instances").json()["instances"][1]
+    client.post("/v1/observations", files=parts(look(), colour_only), params={"category_id": ball["id"]})
+    photographs = client.get(f"/v1/categories/{ball['id']}/instances").json()["instances"][1]
     refused = client.post(path, json={"instance_ids": [photographs["id"]]})
     assert (refused.status_code, "scan the object" in refused.json()["detail"]) == (409, True)
 

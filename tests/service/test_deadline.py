@@ -15,6 +15,7 @@ from fastapi.testclient import TestClient
 from service.app import create_app
 from service.turn import CalledOff, Turn, present, require_wanted
 from service.work import Busy, ClientGone, TooLate, WorkQueue
+from tests.service.conftest import until
 
 SOON_S, LONG_S = 0.1, 20
 
@@ -35,14 +36,6 @@ class Held:
         self.images += len(stack)
         self.open.wait(LONG_S)
         return self._backbone.extract(stack)
-
-
-def until(what):
-    """Waits for it."""
-    end = time.monotonic() + LONG_S
-    while not what():
-        assert time.monotonic() < end, "it never came"
-        time.sleep(0.01)
 
 
 def asks(done):

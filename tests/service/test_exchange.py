@@ -128,12 +128,11 @@ def test_the_same_request_twice_at_once_is_done_once(settings, backbone, look, p
         assert len(observations(client)) == 1
 
 
-def test_an_unchanged_read_is_not_sent_again(client, learn):
-    category = learn()
+def test_an_unchanged_read_is_not_sent_again(client, ball):
     for path in (
         "/v1/categories",
-        f"/v1/categories/{category['id']}",
-        f"/v1/categories/{category['id']}/views/0/pca.png",
+        f"/v1/categories/{ball['id']}",
+        f"/v1/categories/{ball['id']}/views/0/pca.png",
         "/v1/observations",
     ):
         answer = client.get(path)

@@ -21,20 +21,13 @@ from service.batching import BatchingBackbone
 from service.server import WRITE_DEADLINES, Server
 from service.turn import present
 from service.work import WorkQueue
+from tests.service.conftest import until
 from tests.service.test_stopping import Process, served
 
 DEADLINE_S = 1.5
 SHORT_S = 0.15
 """Of a service that is not asked for anything that takes long."""
 LONG_S = 60.0
-
-
-def until(what: Any) -> None:
-    """Waits for it."""
-    end = time.monotonic() + LONG_S
-    while not what():
-        assert time.monotonic() < end, "it never came"
-        time.sleep(0.01)
 
 
 def asked_until_it_ends(service: Process, ask: Any) -> dict[str, Any]:

@@ -40,8 +40,7 @@ def test_the_memory_says_what_it_holds(client, look, parts, learn):
     assert after["size_bytes"] > before["size_bytes"]
 
 
-def test_two_memories_exported_and_imported_into_each_other_answer_alike(client, other, look, parts, learn):
-    learn("bright", "ball")
+def test_two_memories_exported_and_imported_into_each_other_answer_alike(client, other, look, parts, ball):
     scan = other.post("/v1/scans", files=parts(look("dark"))).json()
     other.post(f"/v1/scans/{scan['id']}/views", files=parts(look("dark")))
     other.post(f"/v1/scans/{scan['id']}/complete", json={"name": "stone"})
@@ -57,18 +56,16 @@ def test_two_memories_exported_and_imported_into_each_other_answer_alike(client,
         assert first == second
 
 
-def test_importing_twice_brings_duplicates_only(client, other, learn):
-    category = learn("bright", "ball")
+def test_importing_twice_brings_duplicates_only(client, other, ball):
     archive = client.post("/v1/memory/export").content
     other.post("/v1/memory/import", content=archive, headers=ZIP)
     again = other.post("/v1/memory/import", content=archive, headers=ZIP).json()
     assert again["categories"] == []
-    assert [each["name"] for each in again["duplicates"]] == [category["name"]]
+    assert [each["name"] for each in again["duplicates"]] == [ball["name"]]
     assert len(other.get("/v1/categories").json()["categories"]) == 1
 
 
-def test_names_that_two_have_are_told(client, other, look, parts, learn):
-    learn("bright", "ball")
+def test_names_that_two_have_are_told(client, other, look, parts, ball):
     archive = client.post("/v1/memory/export").content
     scan = other.post("/v1/scans", files=parts(look("dark"))).json()
     other.post(f"/v1/scans/{scan['id']}/views", files=parts(look("dark")))
@@ -76,8 +73,7 @@ def test_names_that_two_have_are_told(client, other, look, parts, learn):
     assert other.post("/v1/memory/import", content=archive, headers=ZIP).json()["same_name"] == ["ball"]
 
 
-def test_a_repeated_import_is_done_once_even_if_its_answer_was_lost(client, other, learn):
-    learn("bright", "ball")
+def test_a_repeated_import_is_done_once_even_if_its_answer_was_lost(client, other, ball):
     archive, headers = client.post("/v1/memory/export").content, ZIP | {"Idempotency-Key": "i1"}
     first = other.post("/v1/memory/import", content=archive, headers=headers).json()
     with other.app.state.agent.memory._connection.housekeeping() as db:
@@ -107,14 +103,13 @@ def test_what_cannot_be_exported_or_imported(client, other, learn):
     assert other.get("/v1/categories").json() == {"categories": []}
 
 
-def test_a_backup_opens_as_a_memory(client, settings, learn):
-    category = learn("bright", "ball")
+def test_a_backup_opens_as_a_memory(client, settings, ball):
     answer = client.post("/v1/memory/backup")
     assert answer.status_code == 201
     made = answer.json()
     assert (Path(made["folder"]).parent, made["damages"]) == (settings.backups, [])
     with Memory.open(Path(made["folder"])) as copy:
-        assert [each.id for each in copy.categories.all()] == [category["id"]]
+        assert [each.id for each in copy.categories.all()] == [ball["id"]]
     assert client.post("/v1/memory/backup").json()["folder"] != made["folder"]
 
 

@@ -9,9 +9,8 @@ from scipy.spatial.transform import Rotation
 
 
 @pytest.fixture
-def seen(client, look, parts, learn):
+def seen(client, look, parts, ball):
     """An observation of a known object."""
-    learn()
     return client.post("/v1/observations", files=parts(look("bright", views=4))).json()
 
 
@@ -51,15 +50,13 @@ def test_debug_is_there_only_when_asked_for(client, seen):
     assert all(0 <= reference < 6 and 0 <= target < 4 for reference, target in debug["pairs"])
 
 
-def test_a_named_category_skips_the_decision(client, look, parts, learn):
-    category = learn("bright")
-    answer = client.post("/v1/observations", files=parts(look("dark")), params={"category_id": category["id"]}).json()
-    assert (answer["outcome"], answer["category_id"]) == ("known", category["id"])
+def test_a_named_category_skips_the_decision(client, look, parts, ball):
+    answer = client.post("/v1/observations", files=parts(look("dark")), params={"category_id": ball["id"]}).json()
+    assert (answer["outcome"], answer["category_id"]) == ("known", ball["id"])
     assert (answer["score"], answer["threshold"], answer["similarities"]) == (None, None, [])
 
 
-def test_a_higher_threshold_makes_it_novel(client, look, parts, learn):
-    learn()
+def test_a_higher_threshold_makes_it_novel(client, look, parts, ball):
     answer = client.post("/v1/observations", files=parts(look()), params={"threshold": 9}).json()
     assert (answer["outcome"], answer["threshold"]) == ("novel", 9)
 
@@ -69,27 +66,24 @@ def test_only_the_first_views_are_used(client, look, parts):
     assert answer["views"] == 2
 
 
-def test_a_known_object_joins_its_category(client, look, parts, learn):
-    category = learn()
+def test_a_known_object_joins_its_category(client, look, parts, ball):
     seen = client.post("/v1/observations", files=parts(look(views=3))).json()
-    assert client.get(f"/v1/categories/{category['id']}").json()["instances"] == 2
+    assert client.get(f"/v1/categories/{ball['id']}").json()["instances"] == 2
     joined = client.app.state.agent.memory.instances.members()[-1]
     assert (joined.category_id, len(joined.cls)) == (seen["category_id"], 3)
 
 
-def test_without_learning_what_is_known_stays_as_it_is(client, look, parts, learn):
-    category = learn()
+def test_without_learning_what_is_known_stays_as_it_is(client, look, parts, ball):
     asked = {"files": parts(look(views=3)), "params": {"learn": False}}
     first, again = (client.post("/v1/observations", **asked).json() for _ in range(2))
     assert first["outcome"] == again["outcome"] == "known"
     assert first["similarities"] == again["similarities"]
-    assert client.get("/v1/categories").json() == {"categories": [category]}
+    assert client.get("/v1/categories").json() == {"categories": [ball]}
 
 
-def test_a_novel_object_joins_nothing(client, look, parts, learn):
-    category = learn("bright")
+def test_a_novel_object_joins_nothing(client, look, parts, ball):
     assert client.post("/v1/observations", files=parts(look("dark"))).json()["outcome"] == "novel"
-    assert client.get("/v1/categories").json() == {"categories": [category]}
+    assert client.get("/v1/categories").json() == {"categories": [ball]}
 
 
 def test_a_view_comes_back_as_it_was_sent(client, look, seen):
@@ -261,16 +255,15 @@ def test_a_novel_object_is_no_detection(client, look, parts):
 
 
 @pytest.mark.parametrize("moment", ["reference", "create"])
-def test_what_is_deleted_while_it_is_decided_for_is_decided_anew(client, look, parts, learn, monkeypatch, moment):
+def test_what_is_deleted_while_it_is_decided_for_is_decided_anew(client, look, parts, ball, monkeypatch, moment):
     """Before its reference is read, or after, before the answer is kept."""
-    category = learn()
     memory = client.app.state.agent.memory
     place = memory.categories if moment == "reference" else memory.observations
     kept = getattr(place, moment)
 
     def deleted_first(*args, **options):
         if memory.categories.all():
-            memory.categories.delete(category["id"])
+            memory.categories.delete(ball["id"])
         return kept(*args, **options)
 
     monkeypatch.setattr(place, moment, deleted_first)
@@ -279,8 +272,7 @@ def test_what_is_deleted_while_it_is_decided_for_is_decided_anew(client, look, p
     assert len(client.get("/v1/observations").json()["observations"]) == 2  # that of learning, and this one
 
 
-def test_a_category_that_the_caller_names_is_not_decided_anew(client, look, parts, learn, monkeypatch):
-    category = learn()
+def test_a_category_that_the_caller_names_is_not_decided_anew(client, look, parts, ball, monkeypatch):
     memory = client.app.state.agent.memory
     kept = memory.categories.reference
 
@@ -289,5 +281,5 @@ def test_a_category_that_the_caller_names_is_not_decided_anew(client, look, part
         return kept(category_id)
 
     monkeypatch.setattr(memory.categories, "reference", deleted_first)
-    answer = client.post("/v1/observations", files=parts(look()), params={"category_id": category["id"]})
+    answer = client.post("/v1/observations", files=parts(look()), params={"category_id": ball["id"]})
     assert answer.status_code == 404

@@ -7,8 +7,7 @@ import re
 import numpy as np
 
 
-def test_an_observation_tells_its_decision(client, learn, look, parts):
-    learn("bright", "ball")
+def test_an_observation_tells_its_decision(client, ball, look, parts):
     client.post("/v1/observations", files=parts(look()))
     text = client.get("/").text
     assert "ball" in text
@@ -23,9 +22,8 @@ def test_scans_fill_as_views_arrive(client, look, parts):
     assert "3 of 10 viewpoints are covered" in client.get("/now/side").text
 
 
-def test_what_was_learnt_is_told(client, learn):
-    category = learn("bright", "ball")
-    client.patch(f"/v1/categories/{category['id']}", json={"name": "egg"})
+def test_what_was_learnt_is_told(client, ball):
+    client.patch(f"/v1/categories/{ball['id']}", json={"name": "egg"})
     text = client.get("/now/side").text
     assert "Learnt “ball” from 6 views" in text
     assert "Renamed “ball” to “egg”" in text

@@ -58,8 +58,7 @@ def test_one_at_a_time(client, begun, episode):
     assert len(begun) == 2
 
 
-def test_nothing_is_taught_among_what_was_learnt(client, begun, episode, learn):
-    learn("bright", "ball")
+def test_nothing_is_taught_among_what_was_learnt(client, begun, episode, ball):
     with pytest.raises(Conflict, match="the memory is not empty"):
         episode.start(client.app.state.agent.memory, "http://x")
     assert begun == []
