@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from clients.datasets import folders
-from clients.datasets.images import is_image, read_mask, read_rgb, read_units
+from clients.datasets.images import is_image, read_depth, read_mask, read_rgb
 from core.errors import InvalidInput
 from core.sim3 import Sim3
 from core.views import Camera, FloatArray, View
@@ -68,7 +68,7 @@ class BopReader(folders.Reader):
         depth_file, mask_file, entry = _depth_file(scene, sight), _mask_file(scene, sight), cameras[sight.key]
         depth_m = None
         if depth_file.exists():
-            depth_m = (read_units(depth_file) * (entry["depth_scale"] / 1000)).astype(np.float32)
+            depth_m = read_depth(depth_file, entry["depth_scale"] / 1000)
         mask = read_mask(mask_file) if (masks or not sight.alone) and mask_file.exists() else None
         return View(read_rgb(sight.image), depth_m, _camera(entry, truth[sight.key][sight.index]), mask)
 

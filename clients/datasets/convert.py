@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clients.datasets.folders import ABOUT, Sequence, load_burst
+from clients.datasets.images import write_image
 from core.errors import InvalidInput
 from core.sim3 import Sim3
 from core.views import View
@@ -45,7 +46,7 @@ def _write_sequence(sequence: Sequence, folder: Path) -> None:
         view = load_burst(sequence, [index], masks=True).views[0]
         _write_rgb(view, sequence.images[index], folder / "rgb" / f"{index:06}")
         if view.mask is not None:
-            _write(folder / "mask_visib" / f"{index:06}_000000.png", view.mask.astype(np.uint8) * 255)
+            write_image(folder / "mask_visib" / f"{index:06}_000000.png", view.mask.astype(np.uint8) * 255)
         if view.camera is None:
             continue
         pose = view.camera.camera_from_world
@@ -75,7 +76,7 @@ def _write_rgb(view: View, source: Path, stem: Path) -> None:
         stem.parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(source, stem.with_suffix(source.suffix.lower()))
     else:
-        _write(stem.with_suffix(".png"), bgr)
+        write_image(stem.with_suffix(".png"), bgr)
 
 
 def _write_depth(view: View, path: Path) -> float:
@@ -83,14 +84,8 @@ def _write_depth(view: View, path: Path) -> float:
     if view.depth_m is None:
         return 1.0
     unit_mm = 1000 * float(view.depth_m.max()) / np.iinfo(np.uint16).max
-    _write(path, np.round(1000 * view.depth_m / unit_mm).astype(np.uint16))
+    write_image(path, np.round(1000 * view.depth_m / unit_mm).astype(np.uint16))
     return unit_mm
-
-
-def _write(path: Path, image: NDArray[Any]) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    if not cv2.imwrite(str(path), image):
-        raise InvalidInput("out", f"{path} cannot be written")
 
 
 def _rigid(name: str, rotation: NDArray[np.floating], translation_m: NDArray[np.floating]) -> dict[str, list[float]]:

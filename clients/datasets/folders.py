@@ -16,7 +16,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from clients.datasets.images import is_image, read_mask, read_rgb, read_units
+from clients.datasets.images import is_image, read_depth, read_mask, read_rgb
 from core.errors import InvalidInput
 from core.sim3 import Sim3
 from core.views import Burst, Camera, FloatArray, View, require_rotation
@@ -133,7 +133,7 @@ def _load_view(sequence: Sequence, image: Path, cameras: dict[str, Any], masks: 
     depth_file = sequence.path / "depth" / f"{image.stem}.png"
     depth_m = None
     if depth_file.exists():
-        depth_m = (read_units(depth_file) * (entry["depth_scale"] / 1000)).astype(np.float32)
+        depth_m = read_depth(depth_file, entry["depth_scale"] / 1000)
     mask_file = sequence.path / "mask_visib" / f"{image.stem}_000000.png"
     mask = read_mask(mask_file) if masks and mask_file.exists() else None
     return View(rgb, depth_m, read_camera(entry), mask)

@@ -5,6 +5,7 @@ Letters: H, W image height and width.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -44,9 +45,24 @@ def read_units(path: Path) -> NDArray[Any]:
     return np.asarray(image)
 
 
+def read_depth(path: Path, unit_m: float) -> NDArray[np.float32]:
+    """z-depth in metres, shape (H, W), of an image in units of `unit_m`."""
+    return np.asarray(read_units(path) * unit_m, dtype=np.float32)
+
+
 def read_mask(path: Path, least: int = 1) -> NDArray[np.bool_]:
     """Where a grey image is at least `least`, shape (H, W)."""
     return np.asarray(_read(path, cv2.IMREAD_GRAYSCALE) >= least)
+
+
+def write_image(path: Path, image: NDArray[Any], options: Sequence[int] = ()) -> None:
+    """Writes a grey image, or one whose channels are blue, green and red, in the format of its suffix; makes its folder.
+
+    Raises InvalidInput where that cannot be.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if not cv2.imwrite(str(path), image, list(options)):
+        raise InvalidInput("out", f"{path} cannot be written")
 
 
 def _read(path: Path, flags: int) -> Any:

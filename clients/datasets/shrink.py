@@ -11,9 +11,9 @@ from typing import Any
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from clients.datasets.folders import Sequence, by_category, find_sequences, load_burst
+from clients.datasets.images import write_image
 from clients.datasets.viewpoints import spread
 from core.errors import InvalidInput
 from core.views import View
@@ -96,18 +96,12 @@ def _scaled_intrinsics(intrinsics: list[float], scale: float) -> list[float]:
 def _write_view(view: View, scale: float, out: Path, number: int, config: ShrinkConfig, depth_step_mm: float) -> None:
     size = (round(view.size[1] * scale), round(view.size[0] * scale))
     rgb = cv2.cvtColor(cv2.resize(view.rgb, size, interpolation=cv2.INTER_AREA), cv2.COLOR_RGB2BGR)
-    _write(out / "rgb" / f"{number:06}.jpg", rgb, [cv2.IMWRITE_JPEG_QUALITY, config.jpeg_quality])
+    write_image(out / "rgb" / f"{number:06}.jpg", rgb, [cv2.IMWRITE_JPEG_QUALITY, config.jpeg_quality])
     if view.depth_m is not None:
         # Interpolated depth would invent surfaces between the object and its background, so the nearest measurement is taken.
         depth = cv2.resize(view.depth_m, size, interpolation=cv2.INTER_NEAREST_EXACT)
         units = np.round(depth * 1000 / depth_step_mm).astype(np.uint16)
-        _write(out / "depth" / f"{number:06}.png", units, PNG_OPTIONS)
+        write_image(out / "depth" / f"{number:06}.png", units, PNG_OPTIONS)
     if view.mask is not None and number < config.masks:
         mask = cv2.resize(view.mask.astype(np.uint8) * 255, size, interpolation=cv2.INTER_NEAREST_EXACT)
-        _write(out / "mask_visib" / f"{number:06}_000000.png", mask, PNG_OPTIONS)
-
-
-def _write(path: Path, image: NDArray[Any], options: list[int]) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    if not cv2.imwrite(str(path), image, options):
-        raise InvalidInput("out", f"{path} cannot be written")
+        write_image(out / "mask_visib" / f"{number:06}_000000.png", mask, PNG_OPTIONS)

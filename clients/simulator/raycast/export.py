@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from clients.datasets.images import write_image
 from clients.simulator.raycast.categories import RECIPES
 from clients.simulator.raycast.model import Model
 from clients.simulator.raycast.sensor import SensorConfig
@@ -121,14 +122,12 @@ def contact_sheet(folders: Sequence[Path], columns: int, file: Path, side: int =
 
 
 def _write_images(folder: Path, number: int, view: View) -> None:
-    for name in ("rgb", "depth", "mask_visib"):
-        (folder / name).mkdir(parents=True, exist_ok=True)
     rgb = cv2.cvtColor(view.rgb, cv2.COLOR_RGB2BGR)
-    cv2.imwrite(str(folder / "rgb" / f"{number:06}.jpg"), rgb, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
+    write_image(folder / "rgb" / f"{number:06}.jpg", rgb, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
     if view.depth_m is not None:
-        cv2.imwrite(str(folder / "depth" / f"{number:06}.png"), np.round(view.depth_m * 1000 / DEPTH_UNIT_MM).astype(np.uint16))
+        write_image(folder / "depth" / f"{number:06}.png", np.round(view.depth_m * 1000 / DEPTH_UNIT_MM).astype(np.uint16))
     if view.mask is not None:
-        cv2.imwrite(str(folder / "mask_visib" / f"{number:06}_000000.png"), view.mask.astype(np.uint8) * 255)
+        write_image(folder / "mask_visib" / f"{number:06}_000000.png", view.mask.astype(np.uint8) * 255)
 
 
 def _any_frame(rng: np.random.Generator) -> FloatArray:
