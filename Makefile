@@ -38,7 +38,7 @@ $(READY): pyproject.toml constraints.txt
 	@if ! $(BIN)/python -c '' 2>/dev/null; then echo "making $(VENV) with $(PYTHON)"; $(PYTHON) -m venv --clear $(VENV) || \
 		{ echo "Python's venv module is missing; on Debian and Ubuntu: sudo apt-get install python3-venv" >&2; rm -rf $(VENV); exit 1; }; fi
 	@echo "installing (the first time downloads a few hundred megabytes)"
-	@PYTHONWARNINGS=ignore $(BIN)/python -m pip install $$([ -t 1 ] || echo --quiet) --disable-pip-version-check --constraint constraints.txt $(if $(TORCH_INDEX),--extra-index-url $(TORCH_INDEX)) --editable '.[server,dev]'
+	@PYTHONWARNINGS=ignore $(BIN)/python -m pip install $$([ -t 2 ] || echo --quiet) --disable-pip-version-check --constraint constraints.txt $(if $(TORCH_INDEX),--extra-index-url $(TORCH_INDEX)) --editable '.[server,dev]'
 	@$(BIN)/python -c 'import open3d' 2>/dev/null || $(if $(filter 0,$(shell id -u)),$(INSTALL_LIBRARIES),false) && $(BIN)/python -c 'import open3d' || \
 		{ echo "Open3D needs system libraries; run: sudo apt-get install $(LIBRARIES)" >&2; exit 1; }
 	@touch $@

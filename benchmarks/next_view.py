@@ -203,11 +203,13 @@ class Memory:
         self._rate = job.rate
         self._scans = dict(job.memory)
         self._members = [_member(category, file) for category, file in job.memory]
+        self._laid: dict[str, Candidate] = {}
+        """Poses of the decision just made."""
 
     def decide(self, encoded: EncodedBurst, looks: int = 0) -> Decision:
         """With poses. `looks`: views taken since the answer was uncertain."""
         whitening = self._encoder.backbone.whitening
-        self._laid: dict[str, Candidate] = {}
+        self._laid = {}
 
         def explain(category: str) -> float:
             reference = _reference(self._scans[category])
