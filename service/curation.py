@@ -96,7 +96,8 @@ class Curation:
 
         Raises NotFound, InvalidInput for instances of another category or all of this one's, Conflict where none can be a reference.
         """
-        own = {instance.id for instance in self._memory.instances.of(category_id)} if self._memory.categories.get(category_id) else set()
+        self._memory.categories.get(category_id)
+        own = {instance.id for instance in self._memory.instances.of(category_id)}
         chosen = list(dict.fromkeys(instance_ids))
         for index, instance_id in enumerate(chosen):
             if instance_id not in own:

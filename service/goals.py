@@ -91,10 +91,8 @@ class Rearranging:
     def _up(self, seen: Observation, up: Up | None) -> FloatArray:
         if up is not None:
             return unit_up(up)
-        cameras = [
-            view.camera for index in range(seen.views) if (view := self._memory.observations.view(seen.id, index)).camera is not None
-        ]
-        told, source = infer_up([camera for camera in cameras if camera is not None])
+        views = self._memory.observations.burst(seen.id).views
+        told, source = infer_up([view.camera for view in views if view.camera is not None])
         if source == "assumed":
             raise InvalidInput("up", "is needed for the anchor base: the views look from one direction, which does not tell where up is")
         return told

@@ -10,10 +10,11 @@ from typing import get_args
 from prometheus_client import CollectorRegistry, Counter, Gauge, Histogram, ProcessCollector, generate_latest
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from core.novelty import Outcome
 from service.events import Event
 from service.work import Refusal, WorkQueue
 from store.memory import Memory
-from store.records import Outcome, ScanState
+from store.records import ScanState
 
 SECONDS = (0.01, 0.03, 0.1, 0.3, 1, 3, 10, 30, 100)
 IMAGES = (1, 2, 4, 8, 16, 32, 64)

@@ -13,7 +13,7 @@ import io
 import os
 import re
 import zipfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
@@ -22,13 +22,14 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 
 from core.errors import Conflict, Unavailable
+from core.rearrange import Anchor
 from store.categories import Categories
-from store.check import Progress
 from store.columns import files_from_json
 from store.connection import Connection, Row, only
-from store.folders import PARTIAL, FileSum, make_parents, problem, sync
+from store.folders import FileSum, make_parents, partial_of, problem, sync
 from store.instances import TOKENS, damaged
-from store.records import Anchor, Assignment, Category
+from store.progress import Progress, untold
+from store.records import Assignment, Category
 from store.retention import now
 
 MANIFEST = "manifest.json"
@@ -120,7 +121,7 @@ class Export:
 
 
 def export(
-    connection: Connection, categories: Categories, path: Path, category_ids: Sequence[str] | None, progress: Progress | None = None
+    connection: Connection, categories: Categories, path: Path, category_ids: Sequence[str] | None, progress: Progress = untold
 ) -> Export:
     """Writes categories, all of them where none are named, to a file that does not exist yet.
 
@@ -132,13 +133,16 @@ def export(
         raise Conflict(f"{path} exists; export to a new file")
     if not chosen:
         raise Conflict("the memory has no categories to export")
-    rows = connection.rows("SELECT key, value FROM meta WHERE key IN ('backbone', 'fingerprint')")
-    partial = path.with_name(PARTIAL + path.name)
+    partial = partial_of(path)
     try:
         make_parents(partial)
         with zipfile.ZipFile(partial, "w", zipfile.ZIP_STORED) as archive:
-            parts = [_category(connection, archive, category) for category in _told(connection, chosen, progress)]
-            made_with = {row["key"]: row["value"] for row in rows}
+            parts = []
+            for category in chosen:
+                parts.append(_category(connection, archive, category))
+                progress(len(parts), len(chosen))
+            kept = connection.meta()
+            made_with = {key: kept[key] for key in ("backbone", "fingerprint") if key in kept}
             manifest = Manifest(format="onelook-categories", version=1, created_at=now(), categories=parts, **made_with)
             archive.writestr(_info(MANIFEST), manifest.model_dump_json(indent=1))
         sync(partial)
@@ -149,13 +153,6 @@ def export(
     finally:
         partial.unlink(missing_ok=True)
     return Export(path, len(parts), path.stat().st_size)
-
-
-def _told(connection: Connection, chosen: Sequence[Category], progress: Progress | None) -> Iterator[Category]:
-    for index, category in enumerate(chosen):
-        yield category
-        if progress is not None:
-            progress(index + 1, len(chosen))
 
 
 def _category(connection: Connection, archive: zipfile.ZipFile, category: Category) -> CategoryEntry:

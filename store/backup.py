@@ -13,10 +13,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from core.errors import Conflict, Unavailable
-from store.check import Damage, Progress, check
+from store.check import Damage, check
 from store.columns import files_from_json
 from store.connection import DATABASE, Connection
-from store.folders import PARTIAL, Files, make_parents, new_folder, sync
+from store.folders import Files, make_parents, new_folder, partial_of, sync
+from store.progress import Progress, untold
 from store.sweep import FOLDERS, sweep
 
 ATTEMPTS = 10
@@ -35,14 +36,14 @@ class Backup:
     """What is damaged in the memory, and so in its copy."""
 
 
-def back_up(connection: Connection, folder: Path, progress: Progress | None = None) -> Backup:
+def back_up(connection: Connection, folder: Path, progress: Progress = untold) -> Backup:
     """Copies a memory to a folder that does not exist yet, and reads the copy once to see that it is whole.
 
     Raises Conflict where the folder exists, Unavailable where it cannot be written.
     """
     if folder.exists():
         raise Conflict(f"{folder} exists; back up to a new folder")
-    partial = folder.with_name(PARTIAL + folder.name)
+    partial = partial_of(folder)
     try:
         shutil.rmtree(partial, ignore_errors=True)
         make_parents(partial)
@@ -75,7 +76,7 @@ def _copy_rows(connection: Connection, partial: Path) -> None:
         source.backup(target)
 
 
-def _copy_folders(connection: Connection, partial: Path, progress: Progress | None) -> bool:
+def _copy_folders(connection: Connection, partial: Path, progress: Progress) -> bool:
     """Copies the folders that the copied rows name and that are not there yet; returns False where one was removed meanwhile."""
     with closing(sqlite3.connect(partial / DATABASE)) as copied:
         named = [(table, *row) for table, query in FOLDERS.items() for row in copied.execute(query)]
@@ -87,8 +88,7 @@ def _copy_folders(connection: Connection, partial: Path, progress: Progress | No
             copied_all = _copy_folder(connection.root / folder, partial / folder, files)
             whole &= copied_all or bool(connection.rows(f"SELECT 1 FROM {table} WHERE id = ?", row_id))
         done += sum(file.size for file in files.values())
-        if progress is not None:
-            progress(done, total)
+        progress(done, total)
     return whole
 
 

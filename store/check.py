@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -10,10 +9,9 @@ from store.columns import files_from_json
 from store.connection import DATABASE, Connection, Row
 from store.folders import Files, problem
 from store.instances import TOKENS, damaged
+from store.progress import Progress, untold
 from store.sweep import FOLDERS
 
-Progress = Callable[[int, int], None]
-"""Told how much of how much is done; bytes unless it says otherwise."""
 Kind = Literal["database", "category", "instance", "observation", "scan"]
 KINDS: dict[str, Kind] = {"categories": "category", "observations": "observation", "scan_bursts": "scan"}
 
@@ -50,21 +48,7 @@ class CheckReport:
         return not self.damages
 
 
-@dataclass(frozen=True)
-class Sizes:
-    """How much a memory holds."""
-
-    categories: int
-    instances: int
-    observations: int
-    scans: int
-    """In progress."""
-    goals: int
-    size: int
-    """Bytes on disk, the bin included."""
-
-
-def check(connection: Connection, progress: Progress | None = None) -> CheckReport:
+def check(connection: Connection, progress: Progress = untold) -> CheckReport:
     """Reads everything once; others may go on changing the memory meanwhile."""
     damages = _database(connection) + _instances(connection)
     folders = [(table, row, files_from_json(row["files"])) for table, query in FOLDERS.items() for row in connection.rows(query)]
@@ -75,29 +59,9 @@ def check(connection: Connection, progress: Progress | None = None) -> CheckRepo
         if found and connection.rows(f"SELECT 1 FROM {table} WHERE id = ?", row["id"]):  # else it was removed meanwhile
             damages += [_of_file(connection, table, row, name, wrong) for name, wrong in found.items()]
         done += _size(files)
-        if progress is not None:
-            progress(done, total)
+        progress(done, total)
     living = connection.rows("SELECT count(*) AS count FROM categories WHERE removed_by IS NULL")[0]["count"]
     return CheckReport(living, sum(len(files) for _, _, files in folders), total, tuple(damages))
-
-
-BYTES = "SELECT coalesce(sum(json_extract(each.value, '$[0]')), 0) AS n FROM {table} AS kept, json_each(kept.files) AS each"
-"""Of the files that a table's rows name; SQLite adds them up ten times as fast as Python reads them."""
-
-
-def sizes(connection: Connection) -> Sizes:
-    """Counts of what lives, and bytes of all that is kept."""
-    count = {
-        "categories": "SELECT count(*) AS n FROM categories WHERE removed_by IS NULL",
-        "instances": "SELECT count(*) AS n FROM instances i JOIN categories c ON c.id = i.category_id "
-        "WHERE i.removed_by IS NULL AND c.removed_by IS NULL",
-        "observations": "SELECT count(*) AS n FROM observations",
-        "scans": "SELECT count(*) AS n FROM scans WHERE state IN ('requested', 'collecting')",
-        "goals": "SELECT count(*) AS n FROM goals g JOIN categories c ON c.id = g.category_id WHERE c.removed_by IS NULL",
-    }
-    kept = sum(connection.rows(BYTES.format(table=table))[0]["n"] for table in FOLDERS)
-    size = kept + (connection.root / DATABASE).stat().st_size
-    return Sizes(**{name: connection.rows(query)[0]["n"] for name, query in count.items()}, size=size)
 
 
 def _size(files: Files) -> int:

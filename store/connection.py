@@ -103,6 +103,10 @@ class Connection:
             with self.housekeeping():
                 pass
 
+    def meta(self) -> dict[str, str]:
+        """What is kept of the memory as a whole, by key."""
+        return {row["key"]: row["value"] for row in self.rows("SELECT key, value FROM meta")}
+
     @contextmanager
     def change(self, made: str | None = None) -> Iterator[Database]:
         """One transaction, which also makes memory_version grow, and notes what a repeatable request `made`.

@@ -35,7 +35,7 @@ Files = Mapping[str, FileSum]
 
 
 def partial_of(final: Path) -> Path:
-    """Where a folder is until it is whole."""
+    """Where a folder or file is until it is whole."""
     return final.with_name(PARTIAL + final.name)
 
 

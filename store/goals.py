@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from core.errors import NotFound
+from core.rearrange import Anchor
 from core.sim3 import Sim3
 from store.categories import Categories
 from store.columns import sim3_from_json, sim3_to_json
 from store.connection import Connection, Row, new_id, only
-from store.records import Anchor, Goal
+from store.records import Goal
 from store.retention import now
 
 SELECT = "SELECT g.* FROM goals g JOIN categories c ON c.id = g.category_id WHERE c.removed_by IS NULL"

@@ -19,11 +19,11 @@ from store.arrays import BLOB_TYPE, arrays_file, patches_from_blob
 from store.audit import record
 from store.bursts import read_burst
 from store.categories import insert_category
-from store.check import Progress
 from store.columns import sim3_from_json
 from store.connection import Connection, Row, new_id
 from store.folders import Files, FileSum
 from store.instances import TOKENS, tokens_sha256
+from store.progress import Progress, untold
 from store.records import Category
 
 MAX_MANIFEST_BYTES = 32_000_000
@@ -65,6 +65,19 @@ class Import:
 
 
 @dataclass(frozen=True, eq=False)
+class _Archive:
+    """An archive that holds what its manifest names, and nothing else."""
+
+    zip: zipfile.ZipFile
+    entries: Mapping[str, zipfile.ZipInfo]
+    manifest: Manifest
+
+    def content(self, name: str) -> bytes:
+        """Of an entry."""
+        return untrusted.content(self.zip, self.entries[name])
+
+
+@dataclass(frozen=True, eq=False)
 class _Judged:
     """A category of an archive that is in order."""
 
@@ -75,22 +88,19 @@ class _Judged:
 
 
 def import_archive(
-    connection: Connection, path: Path, existing: list[Category], *, actor: str | None, progress: Progress | None = None
+    connection: Connection, path: Path, existing: list[Category], *, actor: str | None, progress: Progress = untold
 ) -> Import:
     """See `Memory.import_archive`; `existing` are the memory's categories."""
     try:
-        with untrusted.opened(path, path.name) as archive:
-            found = untrusted.entries(archive, path.stat().st_size)
-            manifest = _manifest(archive, found)
+        with untrusted.opened(path, path.name) as opened:
+            entries = untrusted.entries(opened, path.stat().st_size)
+            manifest = _manifest(opened, entries)
             _require_backbone(connection, manifest)
-            duplicates = _duplicates(manifest, existing)
-            known = {duplicate.archive_id for duplicate in duplicates}
-            parts = [part for part in manifest.categories if part.id not in known]
+            archive = _Archive(opened, entries, manifest)
             for index, part in enumerate(manifest.categories):
-                _judge_entries(archive, found, part)
-                if progress is not None:
-                    progress(index + 1, len(manifest.categories))
-            return _bring(connection, archive, found, manifest, parts, duplicates, existing, path.name, actor)
+                _judge_entries(archive, part)
+                progress(index + 1, len(manifest.categories))
+            return _bring(connection, archive, existing, path.name, actor)
     except OSError as error:
         raise Unavailable(f"cannot read {path}: {error}") from error
 
@@ -117,7 +127,7 @@ def _manifest(archive: zipfile.ZipFile, found: Mapping[str, zipfile.ZipInfo]) ->
 
 
 def _require_backbone(connection: Connection, manifest: Manifest) -> None:
-    kept = {row["key"]: row["value"] for row in connection.rows("SELECT key, value FROM meta")}
+    kept = connection.meta()
     if kept.get("fingerprint", manifest.fingerprint) != manifest.fingerprint:
         raise Conflict(
             f"the archive was made with backbone {manifest.backbone} (fingerprint {manifest.fingerprint}), this memory with "
@@ -132,10 +142,10 @@ def _duplicates(manifest: Manifest, existing: list[Category]) -> tuple[Duplicate
     return tuple(Duplicate(archive_id, category.id, category.name) for archive_id, category in same if category is not None)
 
 
-def _judge_entries(archive: zipfile.ZipFile, found: Mapping[str, zipfile.ZipInfo], part: CategoryEntry) -> None:
+def _judge_entries(archive: _Archive, part: CategoryEntry) -> None:
     """Raises InvalidInput unless every entry is what the manifest says, and of the kind that its name says."""
     for name, file in part.entries().items():
-        written = untrusted.content(archive, found[name])
+        written = archive.content(name)
         if FileSum.of(written) != file.sum:
             raise InvalidInput(untrusted.FIELD, f"{name!r} is not what {MANIFEST} says (SHA-256 differs); copy the archive again")
         if name.endswith(".png"):
@@ -144,17 +154,10 @@ def _judge_entries(archive: zipfile.ZipFile, found: Mapping[str, zipfile.ZipInfo
             untrusted.arrays(written, name)
 
 
-def _bring(
-    connection: Connection,
-    archive: zipfile.ZipFile,
-    found: Mapping[str, zipfile.ZipInfo],
-    manifest: Manifest,
-    parts: list[CategoryEntry],
-    duplicates: tuple[Duplicate, ...],
-    existing: list[Category],
-    source: str,
-    actor: str | None,
-) -> Import:
+def _bring(connection: Connection, archive: _Archive, existing: list[Category], source: str, actor: str | None) -> Import:
+    manifest, duplicates = archive.manifest, _duplicates(archive.manifest, existing)
+    known = {duplicate.archive_id for duplicate in duplicates}
+    parts = [part for part in manifest.categories if part.id not in known]
     judged: dict[Path, _Judged] = {}
     ids = {part.id: new_id() for part in parts}
     entry_id = new_id()
@@ -162,8 +165,8 @@ def _bring(
     def writer(part: CategoryEntry) -> Callable[[Path], None]:
         def write(folder: Path) -> None:
             for name in part.files:
-                (folder / name).write_bytes(untrusted.content(archive, found[f"categories/{part.id}/{name}"]))
-            tokens = untrusted.content(archive, found[f"tokens/{part.id}.npz"])
+                (folder / name).write_bytes(archive.content(f"categories/{part.id}/{name}"))
+            tokens = archive.content(f"tokens/{part.id}.npz")
             judged[folders[part.id]] = _judge_category(folder, part, ids[part.id], manifest.fingerprint, tokens)
 
         return write

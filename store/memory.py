@@ -25,7 +25,7 @@ from store.archive import Export, export
 from store.audit import Audit, record
 from store.backup import Backup, back_up
 from store.categories import Categories
-from store.check import CheckReport, Progress, Sizes, check, sizes
+from store.check import CheckReport, check
 from store.connection import DATABASE, Connection
 from store.corrections import Corrections
 from store.folders import make_parents
@@ -34,13 +34,15 @@ from store.imports import Import, import_archive
 from store.instances import Instances
 from store.keys import Keys
 from store.observations import Observations
+from store.progress import Progress, untold
 from store.records import AuditEntry, Errand
-from store.reembed import Features, Reembedded, reembed
+from store.reembed import Reembedded, reembed
 from store.requests import Requests
 from store.retention import Retention
 from store.scans import Scans
 from store.schema import outdated
 from store.sessions import Sessions
+from store.sizes import Sizes, sizes
 from store.sweep import purge, seal, sweep
 from store.undo import undo
 
@@ -179,7 +181,7 @@ class Memory:
         self.sessions.prune()
         purge(self._connection)
 
-    def check(self, progress: Progress | None = None) -> CheckReport:
+    def check(self, progress: Progress = untold) -> CheckReport:
         """Reads everything once, and names what is damaged and what still works."""
         return check(self._connection, progress)
 
@@ -187,18 +189,18 @@ class Memory:
         """How much there is."""
         return sizes(self._connection)
 
-    def backup(self, folder: Path, progress: Progress | None = None) -> Backup:
+    def backup(self, folder: Path, progress: Progress = untold) -> Backup:
         """Copies the memory, while it is used, to a folder that does not exist yet. Raises Conflict and Unavailable."""
         return back_up(self._connection, folder, progress)
 
-    def export(self, path: Path, category_ids: Sequence[str] | None = None, progress: Progress | None = None) -> Export:
+    def export(self, path: Path, category_ids: Sequence[str] | None = None, progress: Progress = untold) -> Export:
         """Writes categories, all of them where none are named, to a file that does not exist yet. `progress` counts categories.
 
         Raises NotFound, Conflict where the file exists or there is nothing to export, Unavailable where something is damaged.
         """
         return export(self._connection, self.categories, path, category_ids, progress)
 
-    def import_archive(self, path: Path, *, actor: str | None = None, progress: Progress | None = None) -> Import:
+    def import_archive(self, path: Path, *, actor: str | None = None, progress: Progress = untold) -> Import:
         """Takes the categories of another memory's export, all of them or none; those it has already are left as they are.
 
         `progress` counts categories. Raises InvalidInput where the archive is not in order, Conflict where it was made with another
@@ -209,7 +211,7 @@ class Memory:
         self.instances.reload()
         return result
 
-    def reembed(self, backbone: Backbone, features: Features, *, actor: str | None = None, progress: Progress | None = None) -> Reembedded:
+    def reembed(self, backbone: Backbone, *, actor: str | None = None, progress: Progress = untold) -> Reembedded:
         """Computes everything anew from the kept views, with another backbone or again with the same, and then ties the memory to it.
 
         Either all of it happens or nothing does. Instances whose views are no longer kept are dropped where the backbone is another one,
@@ -217,7 +219,7 @@ class Memory:
 
         Raises Unavailable where a category cannot be computed.
         """
-        result = reembed(self._connection, backbone, features, actor=actor, progress=progress)
+        result = reembed(self._connection, backbone, actor=actor, progress=progress)
         self.instances.reload()
         return result
 

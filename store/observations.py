@@ -13,7 +13,7 @@ from sqlite_utils import Database
 from core.encode import EncodedBurst
 from core.errors import Conflict, NotFound
 from core.grounds import Grounds
-from core.novelty import Decision
+from core.novelty import Decision, Outcome
 from core.scan import ScanRequest
 from core.views import Burst, View
 from store.arrays import Array, arrays_file, read_arrays, write_arrays
@@ -31,7 +31,7 @@ from store.columns import (
 from store.connection import Connection, Row, new_id, only
 from store.folders import Files
 from store.instances import insert_instance
-from store.records import Assignment, Observation, Outcome, Pose
+from store.records import Assignment, Observation, Pose
 from store.retention import ahead, now
 from store.scans import insert_scan
 

@@ -13,15 +13,14 @@ from core.affine9 import Affine9
 from core.boxes import OrientedBox
 from core.grounds import Grounds
 from core.matches import Alternative, PoseEstimate
-from core.novelty import Decision
+from core.novelty import Decision, Outcome
+from core.rearrange import Anchor
 from core.reference import Reference
 from core.scan import ScanRequest
 from core.sim3 import Sim3
 from core.views import Burst, FloatArray
 
-Outcome = Literal["known", "uncertain", "novel"]
 ScanState = Literal["requested", "collecting", "completed", "expired"]
-Anchor = Literal["center", "base"]
 Assignment = Literal["scan", "decision", "named"]
 """How a burst came to a category: by the scan it was learnt from, by the decision, or by the caller's word."""
 Change = Literal["create", "rename", "merge", "split", "delete", "forget", "import", "reembed", "undo", "correct"]

@@ -6,7 +6,7 @@ memory is what it was; stopped after it, the old files are what no row names. Bo
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,20 +16,18 @@ from core.agreement import agreeing
 from core.backbones.base import Backbone
 from core.encode import EncodedBurst, Encoder
 from core.errors import InvalidInput, OneLookError, Unavailable
+from core.packing import burst_as_arrays
 from core.reference import build_reference
 from store.arrays import Array, arrays_file, write_arrays
 from store.audit import record
 from store.bursts import read_burst
 from store.categories import reference_columns
-from store.check import Progress
 from store.columns import files_from_json, files_to_json
 from store.connection import Connection, Row
 from store.folders import Files, FileSum, sync
 from store.instances import insert_instance, token_columns
+from store.progress import Progress, untold
 from store.sweep import FOLDERS, sweep
-
-Features = Callable[[EncodedBurst], Mapping[str, Array]]
-"""What an observation keeps of an encoded burst; see `Observations.create`."""
 
 
 @dataclass(frozen=True)
@@ -58,13 +56,11 @@ class _Anew:
     """Tables and ids of observations, and of categories in the bin, that could not be computed."""
 
 
-def reembed(
-    connection: Connection, backbone: Backbone, features: Features, *, actor: str | None = None, progress: Progress | None = None
-) -> Reembedded:
+def reembed(connection: Connection, backbone: Backbone, *, actor: str | None = None, progress: Progress = untold) -> Reembedded:
     """See `Memory.reembed`."""
-    kept = {row["key"]: row["value"] for row in connection.rows("SELECT key, value FROM meta")}
+    kept = connection.meta()
     try:
-        anew = _compute(connection, Encoder(backbone), features, kept["memory_version"], progress)
+        anew = _compute(connection, Encoder(backbone), kept["memory_version"], progress)
         other = kept.get("fingerprint") != backbone.fingerprint
         with connection.change() as db:
             result = _switch(db, anew, other)
@@ -82,7 +78,7 @@ def reembed(
     return result
 
 
-def _compute(connection: Connection, encoder: Encoder, features: Features, generation: str, progress: Progress | None) -> _Anew:
+def _compute(connection: Connection, encoder: Encoder, generation: str, progress: Progress) -> _Anew:
     anew = _Anew({}, {}, {}, {}, [])
     folders = [(table, row) for table in ("categories", "observations") for row in connection.rows(FOLDERS[table])]
     for done, (table, row) in enumerate(folders):
@@ -96,7 +92,7 @@ def _compute(connection: Connection, encoder: Encoder, features: Features, gener
                 anew.categories[row["id"]] = reference_columns(reference, written)
                 anew.references[row["id"]] = encoded
             else:
-                written = _beside(folder, files, f"features-{generation}.npz", features(encoded))
+                written = _beside(folder, files, f"features-{generation}.npz", burst_as_arrays(encoded))
                 checksum = arrays_file(written)[1].sha256
                 anew.observations[row["id"]] = {"files": files_to_json(written), "features_sha256": checksum}
             anew.tokens[row["folder"]] = token_columns(encoded)
@@ -104,8 +100,7 @@ def _compute(connection: Connection, encoder: Encoder, features: Features, gener
             if table == "categories":
                 _require_in_bin(connection, row["id"], error)
             anew.lost.append((table, row["id"]))
-        if progress is not None:
-            progress(done + 1, len(folders))
+        progress(done + 1, len(folders))
     return anew
 
 

@@ -11,7 +11,7 @@ from sqlite_utils import Database, Migrations
 from sqlite_utils.db import ForeignKey
 
 from core.errors import Conflict, Unavailable
-from store.folders import PARTIAL, sync
+from store.folders import partial_of, sync
 
 migrations = Migrations("onelook")
 
@@ -36,7 +36,7 @@ def upgrade(db: Database, database: Path | None = None) -> None:
 
 def _keep(db: Database, copy: Path) -> None:
     """Writes what `db` holds to the file `copy`, whole or not at all; one of an earlier attempt at the same step is replaced."""
-    partial = copy.with_name(PARTIAL + copy.name)
+    partial = partial_of(copy)
     try:
         partial.unlink(missing_ok=True)
         with closing(sqlite3.connect(partial)) as target:

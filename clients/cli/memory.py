@@ -141,16 +141,13 @@ def reembed(
 ) -> None:
     """Compute the memory anew from its views, with another backbone or again with the same. The service must not run on the folder."""
     from core.backbones import load_backbone
-    from service.features import features_as_arrays
     from store.memory import Memory
 
     settings = read_settings({})
     with Memory.open(_folder_with_memory(data_dir)) as stored:
         loaded = load_backbone(backbone or settings.backbone, device=device or settings.device, report=errors.print)
         with progress_of("computing") as progress:
-            done = stored.reembed(
-                loaded, lambda encoded: features_as_arrays(encoded, None), actor="onelook memory reembed", progress=progress
-            )
+            done = stored.reembed(loaded, actor="onelook memory reembed", progress=progress)
     if json:
         print_json(asdict(done) | {"backbone": loaded.name, "fingerprint": loaded.fingerprint})
     else:

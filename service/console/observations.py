@@ -9,6 +9,7 @@ from fastapi import APIRouter, Form, Query, Request, Response
 from fastapi.responses import HTMLResponse, JSONResponse
 
 from core.errors import NotFound, Unavailable
+from core.novelty import Outcome
 from service.access import ACCESS
 from service.agent import Agent
 from service.auth import Caller
@@ -19,7 +20,7 @@ from service.console.pages import Page, render
 from service.console.words import called
 from service.deps import AgentDep, WorkDep
 from service.features import pose_details_from_arrays
-from store.records import Observation, Outcome
+from store.records import Observation
 
 router = APIRouter(prefix="/observations", route_class=Page, include_in_schema=False)
 PAGE = 24

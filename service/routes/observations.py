@@ -7,6 +7,7 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Response
 
 from core.errors import InvalidInput
+from core.novelty import Outcome
 from core.views import Burst
 from service.agent import Agent
 from service.deps import ActorDep, AgentDep, UploadDep, WorkDep
@@ -46,7 +47,7 @@ def list_observations(
     limit: Annotated[int, Query(ge=1, le=1000, description="Most to list.")] = 50,
     before: Annotated[str | None, Query(description="Only those older than this observation: the last one of the page before.")] = None,
     category_id: Annotated[str | None, Query(description="Only those recognised as this category.")] = None,
-    outcome: Annotated[records.Outcome | None, Query(description="Only those decided so.")] = None,
+    outcome: Annotated[Outcome | None, Query(description="Only those decided so.")] = None,
 ) -> ObservationList:
     """The latest observations, newest first."""
     found = agent.memory.observations.latest(limit, before=before, category_id=category_id, outcome=outcome)

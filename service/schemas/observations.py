@@ -12,6 +12,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
+from core.novelty import Outcome
 from core.pose import PoseOptions
 from core.sim3 import Sim3
 from core.views import FloatArray
@@ -189,9 +190,7 @@ class Observation(BaseModel):
     id: str = Field(description="Names it in /v1/observations/{id}.", examples=["9f1c1b8a4b0c4a0fb0a5c0b7f5a0d6c3"])
     created_at: str = Field(description="ISO 8601, UTC.", examples=["2026-01-31T12:00:00.000+00:00"])
     frame: str | None = Field(description="Name of the burst's world frame, as it was sent.", examples=["map"])
-    outcome: records.Outcome = Field(
-        description="`known`: recognised; `novel`: of no category so far; `uncertain`: more views would settle it."
-    )
+    outcome: Outcome = Field(description="`known`: recognised; `novel`: of no category so far; `uncertain`: more views would settle it.")
     views: int = Field(description="Views the answer rests on.", examples=[5])
     category_id: str | None = Field(description="The category it was recognised as; null where it is none, or was deleted since.")
     name: str | None = Field(description="That category's name.")

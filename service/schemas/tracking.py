@@ -11,6 +11,7 @@ import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from core.errors import InvalidInput
+from core.novelty import Outcome
 from core.tracking import TrackConfig
 from core.views import Camera, View
 from service.images import decode_colour, decode_depth, decode_mask
@@ -20,7 +21,6 @@ from service.schemas.geometry import Box, Matrix4, Similarity
 from service.schemas.observations import CategorySimilarity
 from service.schemas.problem import Problem
 from service.tracker import Frame, TrackOptions, Update
-from store import records
 
 LARGEST_WINDOW = 16
 
@@ -108,7 +108,7 @@ class FrameAnswer(BaseModel):
         description="How old what it was computed from is on average, smoothing included: its lag behind an object that moves."
     )
     reason: str | None = Field(description="Why this frame gave no pose.")
-    outcome: records.Outcome | None = Field(description="Where the category was decided with this frame, or could not be.")
+    outcome: Outcome | None = Field(description="Where the category was decided with this frame, or could not be.")
     similarities: list[CategorySimilarity] = Field(description="Then every category compared with, most similar first.")
     latency_ms: float = Field(description="From the frame's arrival to this answer.")
 

@@ -73,7 +73,7 @@ def files(folder: Path) -> dict[str, bytes]:
 
 def test_everything_is_what_the_other_backbone_makes(learnt: Memory, category: Category, other: Backbone, cup: Burst) -> None:
     told: list[tuple[int, int]] = []
-    result = learnt.reembed(other, burst_as_arrays, actor="anna", progress=lambda done, total: told.append((done, total)))
+    result = learnt.reembed(other, actor="anna", progress=lambda done, total: told.append((done, total)))
     assert (result.categories, result.instances, result.observations) == (1, 2, 1)
     assert (result.dropped_instances, result.dropped_observations) == (0, 0)
     assert told == [(1, 2), (2, 2)]
@@ -91,7 +91,7 @@ def test_everything_is_what_the_other_backbone_makes(learnt: Memory, category: C
 
 def test_what_people_said_stays(learnt: Memory, category: Category, other: Backbone) -> None:
     instances = [vars(each) for each in learnt.instances.of(category.id)]
-    learnt.reembed(other, burst_as_arrays)
+    learnt.reembed(other)
     after = learnt.categories.get(category.id)
     assert (after.name, after.created_at, after.instances) == ("cup", category.created_at, 2)
     assert [vars(each) for each in learnt.instances.of(category.id)] == instances
@@ -99,7 +99,7 @@ def test_what_people_said_stays(learnt: Memory, category: Category, other: Backb
 
 
 def test_it_is_whole_and_opens_with_the_other_backbone_only(learnt: Memory, other: Backbone, backbone: Backbone) -> None:
-    learnt.reembed(other, burst_as_arrays)
+    learnt.reembed(other)
     assert learnt.check().ok
     assert len(files(learnt.folder)) == 2
     learnt.close()
@@ -116,7 +116,7 @@ def test_stopped_on_the_way_it_is_what_it_was(learnt: Memory, category: Category
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        learnt.reembed(other, burst_as_arrays, progress=stop)
+        learnt.reembed(other, progress=stop)
     assert files(learnt.folder) == before
     assert learnt.fingerprint == backbone.fingerprint
     assert learnt.categories.reference(category.id).fingerprint == backbone.fingerprint
@@ -126,16 +126,16 @@ def test_a_category_without_its_views_stops_it_and_is_named(learnt: Memory, cate
     before = files(learnt.folder)
     (learnt.categories.folder(category.id) / "001_rgb.png").unlink()
     with pytest.raises(Unavailable, match="category cup cannot be computed anew.*nothing was changed"):
-        learnt.reembed(other, burst_as_arrays)
+        learnt.reembed(other)
     assert files(learnt.folder) == before
     learnt.categories.delete(category.id)
-    assert learnt.reembed(other, burst_as_arrays).categories == 0
+    assert learnt.reembed(other).categories == 0
 
 
 def test_bursts_whose_views_are_gone_are_dropped(learnt: Memory, category: Category, other: Backbone) -> None:
     with learnt._connection.change() as db:
         db.execute("UPDATE instances SET pictures = NULL")
-    assert learnt.reembed(other, burst_as_arrays).dropped_instances == 2
+    assert learnt.reembed(other).dropped_instances == 2
     (of_reference,) = learnt.instances.of(category.id)
     assert of_reference.kept
     assert len(learnt.instances.members()) == 1
@@ -146,7 +146,7 @@ def test_the_same_backbone_mends_damaged_arrays(learnt: Memory, category: Catego
     with learnt._connection.change() as db:
         db.execute("UPDATE instances SET cls = zeroblob(4)")
     assert len(learnt.check().damages) == 3
-    result = learnt.reembed(backbone, burst_as_arrays)
+    result = learnt.reembed(backbone)
     assert (result.instances, result.dropped_instances) == (2, 0)
     assert learnt.check().ok
     assert learnt.categories.reference(category.id).fingerprint == backbone.fingerprint
@@ -156,14 +156,14 @@ def test_the_same_backbone_mends_damaged_arrays(learnt: Memory, category: Catego
 def test_what_is_in_the_bin_comes_back_with_the_other_backbone_too(learnt: Memory, category: Category, other: Backbone) -> None:
     learnt.categories.delete(category.id)
     entry = learnt.audit.latest(1)[0]
-    learnt.reembed(other, burst_as_arrays)
+    learnt.reembed(other)
     learnt.undo(entry.id)
     assert learnt.categories.reference(category.id).fingerprint == "hue-1"
     assert len(learnt.instances.members()) == 2
 
 
 def test_an_export_after_it_is_of_the_other_backbone(learnt: Memory, other: Backbone, tmp_path: Path) -> None:
-    learnt.reembed(other, burst_as_arrays)
+    learnt.reembed(other)
     with Memory.open(tmp_path / "new") as new:
         new.import_archive(learnt.export(tmp_path / "all.zip").path)
         assert new.fingerprint == "hue-1"
@@ -171,21 +171,21 @@ def test_an_export_after_it_is_of_the_other_backbone(learnt: Memory, other: Back
 
 
 def test_the_views_it_read_are_untouched(learnt: Memory, category: Category, other: Backbone, cup: Burst) -> None:
-    learnt.reembed(other, burst_as_arrays)
+    learnt.reembed(other)
     assert np.array_equal(learnt.categories.view(category.id, 3).rgb, cup.views[3].rgb)
 
 
 def test_tokens_of_the_first_backbone_are_not_remembered(learnt: Memory, other: Backbone, cup: Burst, backbone: Backbone) -> None:
     before: EncodedBurst = Encoder(backbone).encode(cup)
     assert decide(learnt.instances.members(), before, DecisionConfig("pooled_best_view")).similarities[0][1] > 0.99
-    learnt.reembed(other, burst_as_arrays)
+    learnt.reembed(other)
     assert decide(learnt.instances.members(), before, DecisionConfig("pooled_best_view")).similarities[0][1] < 0.9
 
 
 def test_an_observation_that_cannot_be_computed_goes_with_its_burst(learnt: Memory, category: Category, other: Backbone) -> None:
     (seen,) = learnt.observations.latest(1)
     (learnt.observations.folder(seen.id) / "000_rgb.png").unlink()
-    result = learnt.reembed(other, burst_as_arrays)
+    result = learnt.reembed(other)
     assert (result.dropped_observations, result.dropped_instances) == (1, 1)
     assert learnt.observations.latest(1) == []
     assert not learnt.observations.folder(seen.id).exists()
