@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,6 +17,7 @@ from core.backbones.base import Backbone
 from core.backbones.dino import DinoBackbone, load
 from core.errors import Unavailable
 
+ARCHITECTURE = Path(__file__).parents[2] / "docs" / "architecture.md"
 TINY = {"hidden_size": 24, "num_hidden_layers": 3, "num_attention_heads": 2, "intermediate_size": 48}
 IMAGES = np.random.default_rng(0).integers(0, 255, (3, 112, 112, 3)).astype(np.uint8)
 
@@ -51,6 +54,13 @@ def test_the_embedded_one_keeps_the_contract(embedded_backbone: Backbone, prove_
 
 def test_what_stands_in_for_backbones_keeps_the_contract(backbone: Backbone, prove_backbone: Callable[[Backbone], None]) -> None:
     prove_backbone(backbone)
+
+
+def test_the_one_of_the_documents_keeps_the_contract(prove_backbone: Callable[[Backbone], None]) -> None:
+    (page,) = re.findall(r"```python\n(.*?OFFERS.*?)```", ARCHITECTURE.read_text(), re.DOTALL)
+    written: dict[str, Any] = {}
+    exec(page, written)
+    prove_backbone(written["OFFERS"]["pixels"](device="cpu", dtype=None, report=print))
 
 
 def test_tokens_and_attention_are_the_models_own(tmp_path: Path) -> None:
