@@ -57,6 +57,11 @@ class Caller:
         """Whether they may do what takes this role."""
         return allows(self.role, needed)
 
+    def may_call(self, operation: str) -> bool:
+        """Whether they may do this operation of `service.access`."""
+        needed = needed_role(operation)
+        return needed is None or self.may(needed)
+
     def as_actor(self, said: str | None) -> str | None:
         """For the audit trail: the key's name, which is sure, before what they say of themselves, which is not."""
         return f"{self.name} ({said})" if self.name and said else self.name or said

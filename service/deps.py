@@ -18,8 +18,11 @@ from core.views import Burst
 from service.agent import Agent
 from service.auth import LONGEST_ACTOR, Caller
 from service.decoding import BurstLimits, Parts, Upload, decode_parts
+from service.limits import media_type
+from service.metrics import Metrics
 from service.npz import decode_npz
 from service.settings import Settings
+from service.state import agent_of, caller_of, metrics_of, settings_of
 from service.work import WorkQueue
 
 IMAGE_PARTS = ("rgb", "depth", "mask")
@@ -27,11 +30,6 @@ PARTS = ("burst", *IMAGE_PARTS)
 T = TypeVar("T")
 Decode = Callable[[], Upload]
 """Decodes a body that has arrived: images are many times larger than their files, so only what is worked on is decoded."""
-
-
-def _agent(request: Request) -> Agent:
-    agent: Agent = request.app.state.agent
-    return agent
 
 
 @dataclass(frozen=True)
@@ -71,20 +69,14 @@ def _actor(
         ),
     ] = None,
 ) -> str | None:
-    caller: Caller = request.state.caller
-    return caller.as_actor(said)
-
-
-def media_type(request: Request) -> str:
-    """Of the body, without parameters."""
-    return request.headers.get("content-type", "").partition(";")[0].strip().lower()
+    return caller_of(request).as_actor(said)
 
 
 async def read_upload(request: Request) -> Decode:
     """The burst in the body, in either form, to be decoded where work is done. Raises InvalidInput, HTTPException 415."""
-    settings: Settings = request.app.state.settings
+    settings = settings_of(request)
     limits = BurstLimits(settings.max_views, settings.max_megapixels)
-    kind = media_type(request)
+    kind = media_type(request.headers)
     if kind == "application/x-npz":
         body = await request.body()
         return lambda: decode_npz(body, limits)
@@ -109,7 +101,7 @@ def read_source(model: type[BaseModel]) -> Callable[[Request], Coroutine[Any, An
     """A dependency: a burst in either form, to be decoded where work is done, or JSON of `model`, which names an observation."""
 
     async def source(request: Request) -> Callable[[], Source]:
-        if media_type(request) != "application/json":
+        if media_type(request.headers) != "application/json":
             decode = await read_upload(request)
             return lambda: _source(decode())
         try:
@@ -160,7 +152,10 @@ async def _burst_part(form: FormData) -> str | bytes:
     return value if isinstance(value, str) else await value.read()
 
 
-AgentDep = Annotated[Agent, Depends(_agent)]
+AgentDep = Annotated[Agent, Depends(agent_of)]
+SettingsDep = Annotated[Settings, Depends(settings_of)]
+MetricsDep = Annotated[Metrics, Depends(metrics_of)]
+CallerDep = Annotated[Caller, Depends(caller_of)]
 WorkDep = Annotated[RequestWork, Depends(_work)]
 ActorDep = Annotated[str | None, Depends(_actor)]
 UploadDep = Annotated[Decode, Depends(read_upload)]

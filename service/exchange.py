@@ -8,8 +8,8 @@ from anyio.to_thread import run_sync
 from fastapi import Request, Response
 
 from core.errors import InvalidInput
-from service.agent import Agent
 from service.auth import Answering, GuardedRoute
+from service.state import agent_of
 from store.requests import Earlier, Reply
 
 KEY = "Idempotency-Key"
@@ -40,7 +40,7 @@ class MemoryRoute(GuardedRoute):
 
 
 async def _conditional(request: Request, answer: Answering) -> Response:
-    memory = _agent(request).memory
+    memory = agent_of(request).memory
     version = await run_sync(lambda: memory.version)  # before the answer is made: it may be newer than its tag, never older
     tag = f'W/"{version}"'
     known = {each.strip() for each in request.headers.get("if-none-match", "").split(",")}
@@ -58,7 +58,7 @@ async def _once(request: Request, answer: Answering, route: str) -> Response:
         raise InvalidInput(KEY, f"has {len(key)} characters; send 1 to {LONGEST_KEY}, such as a UUID made anew for each request")
     digest = _digest(request, await request.body())
     # Entered on the event loop: the key travels to the thread that changes the memory in the context of this task.
-    with _agent(request).memory.requests.once(key, route, digest) as once:
+    with agent_of(request).memory.requests.once(key, route, digest) as once:
         if once.earlier is not None and (once.earlier.reply is not None or route in request.app.state.made):
             return await run_sync(_again, request, once.earlier, route)
         # Also where all that is left of the first time is a step on the way, as the observation that a plan begins with.
@@ -82,11 +82,6 @@ def _again(request: Request, earlier: Earlier, route: str) -> Response:
     reply = earlier.reply
     if reply is None:
         assert earlier.result_id is not None, "what changed nothing is not kept"
-        made = request.app.state.made[route](_agent(request), earlier.result_id)
+        made = request.app.state.made[route](agent_of(request), earlier.result_id)
         reply = Reply(200, "application/json", made.model_dump_json(by_alias=True).encode())
     return Response(reply.body, reply.status, {REPEATED: "true"}, reply.media_type)
-
-
-def _agent(request: Request) -> Agent:
-    agent: Agent = request.app.state.agent
-    return agent

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import time
+from collections.abc import Mapping
 
 from starlette.datastructures import Headers
 from starlette.exceptions import HTTPException
@@ -60,10 +61,14 @@ class BodyLimits:
             self._held -= size
 
     def _most(self, scope: Scope) -> int:
-        kind = Headers(scope=scope).get("content-type", "").partition(";")[0].strip().lower()
-        return self._max_mb * MB if kind in FILES else min(MAX_TEXT_BYTES, self._max_mb * MB)
+        return self._max_mb * MB if media_type(Headers(scope=scope)) in FILES else min(MAX_TEXT_BYTES, self._max_mb * MB)
 
     def _too_large(self, most: int) -> str:
         if most == self._max_mb * MB:
             return f"the body has more than {self._max_mb} MB (ONELOOK_MAX_UPLOAD_MB); send fewer or smaller images, colour as JPEG"
         return f"the body has more than {most // MB} MB, which only images and archives may; send fewer ids or shorter names"
+
+
+def media_type(headers: Mapping[str, str]) -> str:
+    """Of the body, without parameters."""
+    return headers.get("content-type", "").partition(";")[0].strip().lower()

@@ -13,10 +13,9 @@ from service.console.change import done
 from service.console.pages import Page, query, render
 from service.console.score_chart import ScoreChart, score_chart
 from service.console.token_map import token_map
-from service.deps import ActorDep, AgentDep, WorkDep
+from service.deps import ActorDep, AgentDep, SettingsDep, WorkDep
 from service.routes.memory import export_memory
 from service.schemas.memory import ExportQuery, MemoryInfo
-from service.settings import Settings
 from store.records import Errand
 
 router = APIRouter(prefix="/memory", route_class=Page, include_in_schema=False)
@@ -26,14 +25,17 @@ CHANGES = 20
 
 @router.get("")
 def memory(
-    request: Request, agent: AgentDep, change: Annotated[str | None, Query()] = None, before: Annotated[str | None, Query()] = None
+    request: Request,
+    agent: AgentDep,
+    settings: SettingsDep,
+    change: Annotated[str | None, Query()] = None,
+    before: Annotated[str | None, Query()] = None,
 ) -> HTMLResponse:
     """All of it; further changes alone where htmx asks for them."""
     changes = agent.memory.audit.latest(CHANGES + 1, before=before)
     listed: dict[str, Any] = {"changes": changes[:CHANGES], "more": len(changes) > CHANGES, "names": agent.names()}
     if before is not None and "hx-request" in request.headers:
         return render(request, "memory_changes.html", **listed)
-    settings: Settings = request.app.state.settings
     return render(
         request,
         "memory.html",
@@ -68,9 +70,8 @@ def calibrate(agent: AgentDep, actor: ActorDep, percent: Annotated[float | None,
 
 
 @router.post("/backup")
-async def backup(request: Request, agent: AgentDep, work: WorkDep, actor: ActorDep) -> RedirectResponse:
+async def backup(agent: AgentDep, work: WorkDep, settings: SettingsDep, actor: ActorDep) -> RedirectResponse:
     """Copies all of it beside the memory."""
-    settings: Settings = request.app.state.settings
     await work.run_endless(lambda: agent.upkeep.backup(settings.backups, actor=actor))
     return _after(agent, "backup")
 

@@ -10,16 +10,15 @@ from fastapi.responses import HTMLResponse, JSONResponse
 
 from core.errors import NotFound, Unavailable
 from core.novelty import Outcome
-from service.access import ACCESS
 from service.agent import Agent
-from service.auth import Caller
 from service.console.alignment import aligned_scene
 from service.console.change import Name
 from service.console.evidence import Hypothesis, Matrix, Stage
 from service.console.pages import Page, render
 from service.console.words import called
-from service.deps import AgentDep, WorkDep
+from service.deps import AgentDep, CallerDep, WorkDep
 from service.features import pose_details_from_arrays
+from service.state import caller_of
 from store.records import Observation
 
 router = APIRouter(prefix="/observations", route_class=Page, include_in_schema=False)
@@ -68,7 +67,7 @@ def observation(request: Request, observation_id: str, agent: AgentDep, show: Pi
         scan=agent.memory.scans.get(seen.scan_id) if seen.scan_id else None,
         hypotheses=Hypothesis.all_of(seen.pose) if seen.pose else [],
         stages=Stage.all_of(seen.timings_ms),
-        may_correct=_may_correct(request),
+        may_correct=caller_of(request).may_call("correct_observation"),
         **_evidence(agent, seen),
     )
 
@@ -110,14 +109,13 @@ def observation_scene(observation_id: str, agent: AgentDep) -> JSONResponse:
 @router.post("/{observation_id}/correct")
 async def observation_correct(
     observation_id: str,
-    request: Request,
+    caller: CallerDep,
     agent: AgentDep,
     work: WorkDep,
     category_id: Annotated[str, Form()] = "",
     name: Name = "",
 ) -> Response:
     """What it was really of; a new category where none is named."""
-    caller: Caller = request.state.caller
     given = (category_id or None, None if category_id else name.strip() or None)
     await work.run(lambda: agent.curation.correct(observation_id, *given, actor=caller.as_actor("console")))
     return Response(status_code=204, headers={"HX-Refresh": "true"})
@@ -127,11 +125,6 @@ def learnt_from(agent: Agent, observations: Sequence[Observation]) -> dict[str, 
     """Of those whose object was scanned: by their ids the categories that this made."""
     scans = {seen.id: agent.memory.scans.get(seen.scan_id) for seen in observations if seen.scan_id is not None}
     return {observation_id: scan.category_id for observation_id, scan in scans.items() if scan.category_id is not None}
-
-
-def _may_correct(request: Request) -> bool:
-    caller: Caller = request.state.caller
-    return caller.may(ACCESS["correct_observation"] or "viewer")
 
 
 def _evidence(agent: Agent, seen: Observation) -> dict[str, Any]:

@@ -11,8 +11,7 @@ from fastapi.responses import RedirectResponse, Response
 
 from service.auth import COOKIE
 from service.console.pages import Page, render
-from service.deps import AgentDep
-from service.settings import Settings
+from service.deps import AgentDep, SettingsDep
 
 router = APIRouter(route_class=Page, include_in_schema=False)
 LONGEST_KEY = 500
@@ -33,11 +32,11 @@ def sign_in(request: Request, agent: AgentDep, next: Next = "/") -> Response:
 def begin_session(
     request: Request,
     agent: AgentDep,
+    settings: SettingsDep,
     key: Annotated[str, Form(max_length=LONGEST_KEY)],
     next: Annotated[str, Form(max_length=LONGEST_ADDRESS)] = "/",
 ) -> Response:
     """Goes on to where the person was going."""
-    settings: Settings = request.app.state.settings
     found = agent.memory.keys.find(key.strip())
     if found is None:
         return render(request, "sign_in.html", 401, next=own_address(next), wrong=True)

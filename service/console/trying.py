@@ -8,26 +8,22 @@ from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse
 
 from core.errors import Unavailable
-from service.access import ACCESS
-from service.auth import Caller
 from service.console.demo import OBJECTS, Demo
 from service.console.pages import Page, render
-from service.deps import AgentDep
-from service.settings import Settings
+from service.deps import AgentDep, CallerDep, SettingsDep
+from service.state import caller_of
 
 router = APIRouter(prefix="/try", route_class=Page, include_in_schema=False)
 
 
 @router.get("")
-def trying(request: Request, agent: AgentDep) -> HTMLResponse:
+def trying(request: Request, agent: AgentDep, settings: SettingsDep, caller: CallerDep) -> HTMLResponse:
     """Asks for files."""
-    settings: Settings = request.app.state.settings
-    caller: Caller = request.state.caller
     return render(
         request,
         "try.html",
         most_views=settings.max_views,
-        may_observe=caller.may(ACCESS["observe"] or "viewer"),
+        may_observe=caller.may_call("observe"),
         **_demo(request, bool(agent.memory.categories.all())),
     )
 
@@ -39,9 +35,8 @@ def demo(request: Request, agent: AgentDep) -> HTMLResponse:
 
 
 @router.post("/demo")
-def demo_start(request: Request, agent: AgentDep) -> HTMLResponse:
+def demo_start(request: Request, agent: AgentDep, caller: CallerDep) -> HTMLResponse:
     """Begins one."""
-    caller: Caller = request.state.caller
     _of(request).start(agent.memory, _own_address(request), actor=caller.as_actor("console"))
     return render(request, "demo.html", **_demo(request, False))
 
@@ -59,8 +54,8 @@ def _of(request: Request) -> Demo:
 
 
 def _demo(request: Request, taught: bool) -> dict[str, Any]:
-    caller: Caller = request.state.caller
-    return {"demo": _of(request).state(), "objects": OBJECTS, "taught": taught, "may_demo": caller.may("admin")}
+    may_demo = caller_of(request).may_call("console_demo_start")
+    return {"demo": _of(request).state(), "objects": OBJECTS, "taught": taught, "may_demo": may_demo}
 
 
 def _own_address(request: Request) -> str:

@@ -14,12 +14,11 @@ from starlette.exceptions import HTTPException
 
 from service.agent import Agent
 from service.auth import GuardedRoute
-from service.deps import ActorDep, AgentDep, WorkDep, media_type
+from service.deps import ActorDep, AgentDep, MetricsDep, SettingsDep, WorkDep
 from service.exchange import MemoryRoute
-from service.metrics import Metrics
+from service.limits import media_type
 from service.schemas.memory import AuditEntry, AuditList, Backup, Calibrate, ExportQuery, Import, MemoryInfo, Thresholds
 from service.schemas.problem import problems
-from service.settings import Settings
 
 router = APIRouter(tags=["memory"], route_class=MemoryRoute)
 live = APIRouter(tags=["memory"], route_class=GuardedRoute)
@@ -41,9 +40,8 @@ def calibrate_memory(calibrate: Calibrate, agent: AgentDep, actor: ActorDep) -> 
 
 
 @live.post("/v1/memory/backup", status_code=201, responses=problems(409, 422, 503))
-async def backup_memory(agent: AgentDep, work: WorkDep, request: Request, actor: ActorDep) -> Backup:
+async def backup_memory(agent: AgentDep, work: WorkDep, settings: SettingsDep, actor: ActorDep) -> Backup:
     """Copies the whole memory, while it is used, to a new folder in ONELOOK_BACKUP_DIR; the copy opens as a memory."""
-    settings: Settings = request.app.state.settings
     return await work.run_endless(lambda: Backup.of(agent.upkeep.backup(settings.backups, actor=actor)))
 
 
@@ -70,8 +68,10 @@ async def export_memory(
 @router.post("/v1/memory/import", status_code=201, responses=problems(409, 413, 415, 422, 503), openapi_extra={"requestBody": ARCHIVE_BODY})
 async def import_memory(request: Request, agent: AgentDep, work: WorkDep, actor: ActorDep) -> Import:
     """Takes in the categories of another memory's export: all, or none where anything is wrong; those it has already stay as they are."""
-    if media_type(request) != ARCHIVE:
-        raise HTTPException(415, f"the body is {media_type(request) or 'of no media type'}; send the file of an export as {ARCHIVE}")
+    if media_type(request.headers) != ARCHIVE:
+        raise HTTPException(
+            415, f"the body is {media_type(request.headers) or 'of no media type'}; send the file of an export as {ARCHIVE}"
+        )
     body = await request.body()
     return await work.run_endless(lambda: _import(agent, body, actor))
 
@@ -105,9 +105,8 @@ async def events(
     response_class=Response,
     responses={200: {"description": "Prometheus's text format", "content": {"text/plain": {}}}, **problems(503)},
 )
-def metrics(agent: AgentDep, request: Request) -> Response:
+def metrics(agent: AgentDep, counted: MetricsDep) -> Response:
     """Figures for Prometheus."""
-    counted: Metrics = request.app.state.metrics
     return Response(counted.text(agent.memory), media_type="text/plain; version=0.0.4")
 
 
