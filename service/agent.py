@@ -16,14 +16,14 @@ from core.scan import DEFAULT_VIEWPOINTS, ScanOptions, ScanRequest, request_scan
 from core.scores import DEFAULT_SCORE
 from core.verification import VERIFYING
 from core.views import Burst
-from service.compute import Compute, Named
+from service.cancelling import require_wanted
+from service.compute import CategoryReference, Compute
 from service.curation import Curation
 from service.events import Events
 from service.features import features_as_arrays
 from service.goals import Rearranging
 from service.judgement import Judge, Judgement
 from service.scanning import Scanning
-from service.turn import require_wanted
 from service.upkeep import Upkeep
 from store.memory import Memory
 from store.observations import Answer, Joins
@@ -74,8 +74,15 @@ class ObserveOptions:
 WITHOUT_DEPTH = "pnp"
 DECISIONS = 3
 """For one burst at most: what was decided for may be deleted before the answer is kept; then it is decided anew."""
-_PoseOrReason = tuple[PoseEstimate | None, Pose | None, str | None]
-"""What was estimated and what is kept of it; or why there is nothing."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Posed:
+    """What was estimated and what is kept of it; or why there is nothing."""
+
+    estimate: PoseEstimate | None = None
+    kept: Pose | None = None
+    error: str | None = None
 
 
 class Agent:
@@ -108,47 +115,46 @@ class Agent:
         clock = StageClock()
         seen = look(burst, self.encoder)
         clock.lap("encode")
-        for _ in range(DECISIONS - 1):
+        for left in reversed(range(DECISIONS)):
             try:
                 return self._decide_and_keep(seen, options, config, clock, frame)
             except (NotFound, Conflict):
-                if options.category_id is not None:
+                if options.category_id is not None or not left:
                     raise
-        return self._decide_and_keep(seen, options, config, clock, frame)
+        raise AssertionError("the last decision is kept or raises")
 
     def _decide_and_keep(
         self, seen: Look, options: ObserveOptions, config: PoseConfig, clock: StageClock, frame: str | None
     ) -> Observation:
         """Raises NotFound or Conflict where the category that was decided for is deleted meanwhile."""
         judge = self._judge_of(seen.encoded, options.seed)
-        judged = None if options.category_id is not None else self._judge(judge, options)
+        judged = None if options.category_id is not None else self._decide(judge, options)
         decision = judged.decision if judged else None
         clock.lap("decide")
         outcome = decision.outcome if decision else "known"
         category_id = None
-        pose: _PoseOrReason = (None, None, None)
+        posed = _Posed()
         request, scan_error = None, None
         if outcome == "known":
             category_id = decision.similarities[0][0] if decision else options.category_id
             assert category_id is not None
-            pose = self._pose(category_id, seen.burst, judge, config, clock)
+            posed = self._pose(category_id, seen.burst, judge, config, clock)
         elif outcome == "novel":
             request, scan_error = self._scan_or_reason(seen.encoded, options.up)
-        estimate, record, pose_error = pose
         answer = Answer(
             outcome=outcome,
             category_id=category_id,
             frame=frame,
             decision=decision,
-            pose=record,
-            pose_error=pose_error,
+            pose=posed.kept,
+            pose_error=posed.error,
             scan_error=scan_error,
-            timings_ms=_timings(clock, seen.encoded, estimate),
+            timings_ms=_timings(clock, seen.encoded, posed.estimate),
             grounds=seen.grounds,
             viewpoints=judged.viewpoints if judged else None,
         )
         joins = _joins(category_id, seen.encoded, decision) if options.learn else None
-        features = features_as_arrays(seen.encoded, estimate)
+        features = features_as_arrays(seen.encoded, posed.estimate)
         observation = self.memory.observations.create(answer, seen.burst, features, request, joins=joins)
         self.events.publish("observation", id=observation.id, outcome=outcome, category_id=category_id, timings_ms=answer.timings_ms)
         return observation
@@ -159,7 +165,7 @@ class Agent:
 
     def decide(self, encoded: EncodedBurst, seed: int = 0) -> Decision:
         """What a burst is taken for, without keeping or learning anything."""
-        return self._judge(self._judge_of(encoded, seed), ObserveOptions(learn=False)).decision
+        return self._decide(self._judge_of(encoded, seed), ObserveOptions(learn=False)).decision
 
     def names(self) -> dict[str, str | None]:
         """Of all categories, by id."""
@@ -180,26 +186,26 @@ class Agent:
     def _judge_of(self, encoded: EncodedBurst, seed: int) -> Judge:
         return Judge(self.memory, encoded, self.backbone.whitening, self.solver, seed)
 
-    def _judge(self, judge: Judge, options: ObserveOptions) -> Judgement:
+    def _decide(self, judge: Judge, options: ObserveOptions) -> Judgement:
         threshold = self.config.threshold if options.threshold is None else options.threshold
         rate = self.upkeep.false_known_rate if options.false_known_rate is None else options.false_known_rate
         judged = judge.judge(DecisionConfig(self.config.score, threshold, rate, options.looks))
         return judged if options.learn else replace(judged, decision=replace(judged.decision, rival=None))
 
-    def _pose(self, category_id: str, burst: Burst, judge: Judge, config: PoseConfig, clock: StageClock) -> _PoseOrReason:
+    def _pose(self, category_id: str, burst: Burst, judge: Judge, config: PoseConfig, clock: StageClock) -> _Posed:
         if category_id in judge.poses and config == VERIFYING:
             reference, estimate = judge.poses[category_id]
-            return estimate, Pose.of(estimate, reference, burst), None
+            return _Posed(estimate, Pose.of(estimate, reference, burst))
         require_wanted()
         try:
             reference = self.memory.categories.reference(category_id)
             clock.lap("load")
-            estimate = self.solver.estimate(Named(category_id, reference), config, judge.encoded, seed=judge.seed)
+            estimate = self.solver.estimate(CategoryReference(category_id, reference), config, judge.encoded, seed=judge.seed)
         except (NoPose, InvalidInput, Unavailable) as error:  # one damaged category leaves the others working
-            return None, None, str(error)
+            return _Posed(error=str(error))
         finally:
             clock.lap("pose")
-        return estimate, Pose.of(estimate, reference, burst), None
+        return _Posed(estimate, Pose.of(estimate, reference, burst))
 
     def _scan_or_reason(self, encoded: EncodedBurst, up: tuple[float, float, float] | None) -> tuple[ScanRequest | None, str | None]:
         try:

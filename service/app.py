@@ -25,7 +25,7 @@ from service.agent import Agent, AgentConfig
 from service.auth import Guard
 from service.batching import BatchingBackbone
 from service.browsers import OwnPagesOnly
-from service.compute import Compute, local
+from service.compute import Compute, in_this_process
 from service.console.demo import Demo
 from service.console.install import install as install_console
 from service.events import Event, Events
@@ -122,7 +122,7 @@ def open_agent(settings: Settings, metrics: Metrics, backbone: Backbone | None, 
             metrics.count_event(event)
             log_event(event)
 
-        chosen = compute or local(BatchingBackbone(backbone or warm_backbone(settings), metrics.count_pass, settings.deadline_s))
+        chosen = compute or in_this_process(BatchingBackbone(backbone or warm_backbone(settings), metrics.count_pass, settings.deadline_s))
         agent = Agent(chosen, opened, config, Events(tell))
         if config.score == BEST and agent.backbone.fingerprint != Prior.shipped().fingerprint:
             log.warning("thresholds start from figures of another backbone, %s, until the memory has decisions of its own", EMBEDDED)

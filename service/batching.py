@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from core.backbones.base import Backbone, Features
 from core.encode import EncoderConfig
 from core.errors import OneLookError, Unavailable
-from service.turn import CalledOff, require_wanted
+from service.cancelling import CalledOff, require_wanted
 
 Images = NDArray[np.uint8]
 LARGEST_PASS = 64

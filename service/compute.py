@@ -15,7 +15,7 @@ from core.verification import verify
 from service.batching import BatchingBackbone
 
 
-class Identity(Protocol):
+class BackboneIdentity(Protocol):
     """Which backbone tokens come from."""
 
     @property
@@ -33,7 +33,7 @@ class Identity(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Named:
+class CategoryReference:
     """A category's reference."""
 
     category_id: str
@@ -44,11 +44,13 @@ class Named:
 class Solves(Protocol):
     """Poses of references on bursts."""
 
-    def estimate(self, named: Named, config: PoseConfig, target: EncodedBurst, *, seed: int) -> PoseEstimate:
+    def estimate(self, known: CategoryReference, config: PoseConfig, target: EncodedBurst, *, seed: int) -> PoseEstimate:
         """See `core.pose.PoseEstimator.estimate`."""
         ...
 
-    def verify(self, named: Named, target: EncodedBurst, whitening: Whitening | None, *, seed: int) -> tuple[PoseEstimate, float]:
+    def verify(
+        self, known: CategoryReference, target: EncodedBurst, whitening: Whitening | None, *, seed: int
+    ) -> tuple[PoseEstimate, float]:
         """See `core.verification.verify`."""
         ...
 
@@ -56,24 +58,26 @@ class Solves(Protocol):
 class Solver:
     """In this process."""
 
-    def estimate(self, named: Named, config: PoseConfig, target: EncodedBurst, *, seed: int) -> PoseEstimate:
+    def estimate(self, known: CategoryReference, config: PoseConfig, target: EncodedBurst, *, seed: int) -> PoseEstimate:
         """See `core.pose.PoseEstimator.estimate`."""
-        return PoseEstimator(config).estimate(named.reference, target, seed=seed)
+        return PoseEstimator(config).estimate(known.reference, target, seed=seed)
 
-    def verify(self, named: Named, target: EncodedBurst, whitening: Whitening | None, *, seed: int) -> tuple[PoseEstimate, float]:
+    def verify(
+        self, known: CategoryReference, target: EncodedBurst, whitening: Whitening | None, *, seed: int
+    ) -> tuple[PoseEstimate, float]:
         """See `core.verification.verify`."""
-        return verify(named.reference, target, whitening, seed=seed)
+        return verify(known.reference, target, whitening, seed=seed)
 
 
 @dataclass(frozen=True, eq=False)
 class Compute:
     """All of it, for one agent."""
 
-    backbone: Identity
+    backbone: BackboneIdentity
     encoder: Encodes
     solver: Solves = field(default_factory=Solver)
 
 
-def local(backbone: BatchingBackbone) -> Compute:
+def in_this_process(backbone: BatchingBackbone) -> Compute:
     """In this process."""
     return Compute(backbone, Encoder(backbone))

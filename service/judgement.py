@@ -15,8 +15,8 @@ from core.next_view import Candidate, next_viewpoints
 from core.novelty import Context, Decision, DecisionConfig, decide
 from core.reference import Reference
 from core.scores import BEST
-from service.compute import Named, Solves
-from service.turn import require_wanted
+from service.cancelling import require_wanted
+from service.compute import CategoryReference, Solves
 from store.memory import Memory
 
 CALIBRATED_BY = 300
@@ -61,7 +61,7 @@ class Judge:
         require_wanted()
         try:
             reference = self.memory.categories.reference(category_id)
-            estimate, found = self.solver.verify(Named(category_id, reference), self.encoded, self.whitening, seed=self.seed)
+            estimate, found = self.solver.verify(CategoryReference(category_id, reference), self.encoded, self.whitening, seed=self.seed)
         except (NoPose, InvalidInput, Unavailable):  # nothing of the reference is found in the burst, or the reference is damaged
             return 0.0
         self.poses[category_id] = (reference, estimate)

@@ -12,7 +12,7 @@ from contextvars import Context, copy_context
 from typing import Any, Literal, TypeVar
 
 from core.errors import Unavailable
-from service.turn import Turn, present
+from service.cancelling import Cancellation, present
 from store.connection import before_change
 
 T = TypeVar("T")
@@ -66,10 +66,10 @@ class WorkQueue:
         self._stopping = False
         self._lock = threading.Lock()
         self._pending = 0
-        self._running: set[Turn] = set()
-        self._given_up: dict[Turn, float] = {}
+        self._running: set[Cancellation] = set()
+        self._given_up: dict[Cancellation, float] = {}
         """Pieces that still run though nobody waits for them, and since when."""
-        self._late_writes: dict[Turn, float] = {}
+        self._late_writes: dict[Cancellation, float] = {}
         """Pieces that would have been given up if they did not write already, and since when."""
 
     @property
@@ -91,31 +91,31 @@ class WorkQueue:
     def writing(self) -> bool:
         """Whether something writes that is not late, or may take as long as it takes."""
         with self._lock:
-            return any(turn.writing for turn in self._running - self._late_writes.keys())
+            return any(cancellation.writing for cancellation in self._running - self._late_writes.keys())
 
     async def run(self, work: Callable[[], T], *, gone: Gone | None = None, endless: bool = False) -> T:
         """The result of `work()`; what is `endless` is waited for however long it takes, also for nobody.
 
         Raises Busy, TooLate after the queue's deadline, and ClientGone once `gone` returns. What was not begun by then is dropped; what
-        runs learns of it where it asks (service/turn.py), and keeps its worker until then. What already writes is finished and answered,
-        however late.
+        runs learns of it where it asks (service/cancelling.py), and keeps its worker until then. What already writes is finished and
+        answered, however late.
         """
         self._require_place()
-        turn = Turn()
+        cancellation = Cancellation()
         if endless:
-            turn.begin_writing()
+            cancellation.begin_writing()
         with self._lock:
             self._pending += 1
-        future: Future[T] = self._threads.submit(self._piece, turn, work, copy_context(), time.perf_counter())
+        future: Future[T] = self._threads.submit(self._piece, cancellation, work, copy_context(), time.perf_counter())
         future.add_done_callback(lambda _: self._leave())
         answer = asyncio.wrap_future(future)
         answer.add_done_callback(lambda done: done.cancelled() or done.exception())  # looked at, since nobody else may
         try:
             why = None if endless else await self._awaited(answer, gone)
         except asyncio.CancelledError:
-            self._give_up(turn, future)
+            self._give_up(cancellation, future)
             raise
-        if why is not None and self._give_up(turn, future):
+        if why is not None and self._give_up(cancellation, future):
             self._on_refusal("gone" if isinstance(why, ClientGone) else "late")
             never_begun = future.cancelled() and isinstance(why, TooLate)
             raise self._busy(f"no worker was free for {self._deadline_s:g} s") if never_begun else why
@@ -139,13 +139,13 @@ class WorkQueue:
             f"it was not done within {self._deadline_s:g} s (ONELOOK_DEADLINE_S), and nothing was changed; send fewer or smaller views"
         )
 
-    def _give_up(self, turn: Turn, future: Future[Any]) -> bool:
+    def _give_up(self, cancellation: Cancellation, future: Future[Any]) -> bool:
         """Whether it could be: not where it writes already."""
-        dropped = turn.call_off()
+        dropped = cancellation.call_off()
         if not (dropped and future.cancel()):
             with self._lock:
-                if turn in self._running:
-                    (self._given_up if dropped else self._late_writes)[turn] = time.monotonic()
+                if cancellation in self._running:
+                    (self._given_up if dropped else self._late_writes)[cancellation] = time.monotonic()
         return dropped
 
     def stop(self) -> None:
@@ -183,25 +183,25 @@ class WorkQueue:
             self._on_refusal("stopping")
             raise Busy(f"the service is stopping; send it again in {RESTART_S} s, when it may have started anew", RESTART_S)
 
-    def _piece(self, turn: Turn, work: Callable[[], T], context: Context, arrived: float) -> T:
+    def _piece(self, cancellation: Cancellation, work: Callable[[], T], context: Context, arrived: float) -> T:
         """In a thread of the pool."""
         self._require_open()
         start = time.perf_counter()
         with self._lock:
-            self._running.add(turn)
+            self._running.add(cancellation)
         try:
-            turn.require()
+            cancellation.require()
             self._on_start(start - arrived)
-            return context.run(_with_turn, turn, work)
+            return context.run(_cancellable, cancellation, work)
         except Exception:
             raise
         except BaseException as error:  # of a library that ends what it takes for its own process; this one goes on
             raise Unavailable(f"the worker was ended ({error!r}); the next request gets another one") from error
         finally:
             with self._lock:
-                self._running.discard(turn)
-                self._given_up.pop(turn, None)
-                self._late_writes.pop(turn, None)
+                self._running.discard(cancellation)
+                self._given_up.pop(cancellation, None)
+                self._late_writes.pop(cancellation, None)
             self._piece_s = MEMORY * self._piece_s + (1 - MEMORY) * (time.perf_counter() - start)
 
     def _leave(self) -> None:
@@ -209,7 +209,7 @@ class WorkQueue:
             self._pending -= 1
 
 
-def _with_turn(turn: Turn, work: Callable[[], T]) -> T:
-    present.set(turn)
-    before_change.set(turn.begin_writing)
+def _cancellable(cancellation: Cancellation, work: Callable[[], T]) -> T:
+    present.set(cancellation)
+    before_change.set(cancellation.begin_writing)
     return work()

@@ -22,8 +22,8 @@ from core.matches import PoseEstimate
 from core.pose import PoseConfig
 from core.reference import Reference
 from core.views import Burst
-from service.compute import Named
-from service.turn import CalledOff, require_wanted
+from service.cancelling import CalledOff, require_wanted
+from service.compute import CategoryReference
 
 APPLICATION = "onelook"
 ATTEMPTS = 3
@@ -80,29 +80,31 @@ class RemoteSolver:
         self._published: OrderedDict[str, ray.ObjectRef[Reference]] = OrderedDict()
         self._lock = threading.Lock()
 
-    def estimate(self, named: Named, config: PoseConfig, target: EncodedBurst, *, seed: int) -> PoseEstimate:
+    def estimate(self, known: CategoryReference, config: PoseConfig, target: EncodedBurst, *, seed: int) -> PoseEstimate:
         """Raises as `core.pose.PoseEstimator.estimate` does, Unavailable, and CalledOff."""
-        published = self._publish(named)
-        estimate: PoseEstimate = _result(lambda: self._solvers.estimate.remote(published, named.category_id, config, target, seed))
+        published = self._publish(known)
+        estimate: PoseEstimate = _result(lambda: self._solvers.estimate.remote(published, known.category_id, config, target, seed))
         return estimate
 
-    def verify(self, named: Named, target: EncodedBurst, whitening: Whitening | None, *, seed: int) -> tuple[PoseEstimate, float]:
+    def verify(
+        self, known: CategoryReference, target: EncodedBurst, whitening: Whitening | None, *, seed: int
+    ) -> tuple[PoseEstimate, float]:
         """Raises as `core.verification.verify` does, Unavailable, and CalledOff."""
-        published = self._publish(named)
+        published = self._publish(known)
         verified: tuple[PoseEstimate, float] = _result(
-            lambda: self._solvers.verify.remote(published, named.category_id, target, whitening, seed)
+            lambda: self._solvers.verify.remote(published, known.category_id, target, whitening, seed)
         )
         return verified
 
-    def _publish(self, named: Named) -> ray.ObjectRef[Reference]:
+    def _publish(self, known: CategoryReference) -> ray.ObjectRef[Reference]:
         """Once: Ray keeps one copy a machine, which the processes there read without copying it again."""
         with self._lock:
-            if named.category_id not in self._published:
-                self._published[named.category_id] = ray.put(named.reference)
-            self._published.move_to_end(named.category_id)
+            if known.category_id not in self._published:
+                self._published[known.category_id] = ray.put(known.reference)
+            self._published.move_to_end(known.category_id)
             while len(self._published) > PUBLISHED:
                 self._published.popitem(last=False)
-            return self._published[named.category_id]
+            return self._published[known.category_id]
 
 
 def _result(ask: Callable[[], Any]) -> Any:

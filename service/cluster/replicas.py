@@ -17,7 +17,7 @@ from core.views import Burst
 from service.app import warm_backbone
 from service.batching import BatchingBackbone
 from service.cluster.remote import Facts
-from service.compute import Named, Solver
+from service.compute import CategoryReference, Solver
 from service.logs import config
 from service.settings import Settings
 
@@ -64,10 +64,10 @@ class PoseSolverReplica:
         self, reference: Reference, category_id: str, config: PoseConfig, target: EncodedBurst, seed: int
     ) -> PoseEstimate | OneLookError:
         """See `core.pose.PoseEstimator.estimate`."""
-        return _told(lambda: self._solver.estimate(Named(category_id, reference), config, target, seed=seed))
+        return _told(lambda: self._solver.estimate(CategoryReference(category_id, reference), config, target, seed=seed))
 
     def verify(
         self, reference: Reference, category_id: str, target: EncodedBurst, whitening: Whitening | None, seed: int
     ) -> tuple[PoseEstimate, float] | OneLookError:
         """See `core.verification.verify`."""
-        return _told(lambda: self._solver.verify(Named(category_id, reference), target, whitening, seed=seed))
+        return _told(lambda: self._solver.verify(CategoryReference(category_id, reference), target, whitening, seed=seed))

@@ -9,7 +9,7 @@ import pytest
 
 from core.errors import Conflict, InvalidInput, TooFewViews
 from service.agent import Agent, AgentConfig, ObserveOptions
-from service.compute import local
+from service.compute import in_this_process
 from store.memory import Memory
 
 CONFIG = AgentConfig("pooled_best_view", 0.7, variant="ucd")
@@ -19,7 +19,7 @@ CONFIG = AgentConfig("pooled_best_view", 0.7, variant="ucd")
 def agent(tmp_path, backbone):
     """An agent with an empty memory."""
     with Memory.open(tmp_path / "memory") as memory:
-        yield Agent(local(backbone), memory, CONFIG)
+        yield Agent(in_this_process(backbone), memory, CONFIG)
 
 
 def test_look_scan_know(agent, look):
@@ -35,13 +35,13 @@ def test_look_scan_know(agent, look):
 def test_an_answer_is_the_same_after_reopening(tmp_path, backbone, look):
     asked = look("bright", views=3), ObserveOptions(learn=False)
     with Memory.open(tmp_path / "memory") as memory:
-        agent = Agent(local(backbone), memory, CONFIG)
+        agent = Agent(in_this_process(backbone), memory, CONFIG)
         scan = agent.scanning.begin(look())
         agent.scanning.add(scan.id, look())
         agent.scanning.complete(scan.id)
         before = agent.observe(*asked)
     with Memory.open(tmp_path / "memory") as memory:
-        after = Agent(local(backbone), memory, CONFIG).observe(*asked)
+        after = Agent(in_this_process(backbone), memory, CONFIG).observe(*asked)
     assert after.decision.similarities == before.decision.similarities
     assert np.array_equal(after.pose.target_from_reference.as_matrix(), before.pose.target_from_reference.as_matrix())
 

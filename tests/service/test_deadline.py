@@ -13,7 +13,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from service.app import create_app
-from service.turn import CalledOff, Turn, present, require_wanted
+from service.cancelling import CalledOff, Cancellation, present, require_wanted
 from service.work import Busy, ClientGone, TooLate, WorkQueue
 from tests.service.conftest import until
 
@@ -96,10 +96,10 @@ def test_what_writes_already_is_done_and_answered_however_late():
 
 
 def test_what_was_called_off_writes_nothing():
-    turn = Turn()
-    assert turn.call_off()
+    cancellation = Cancellation()
+    assert cancellation.call_off()
     with pytest.raises(CalledOff):
-        turn.begin_writing()
+        cancellation.begin_writing()
 
 
 def test_whoever_goes_away_frees_place_and_worker():

@@ -18,8 +18,8 @@ from fastapi import FastAPI
 
 from core.errors import Unavailable
 from service.batching import BatchingBackbone
+from service.cancelling import present
 from service.server import WRITE_DEADLINES, Server
-from service.turn import present
 from service.work import WorkQueue
 from tests.service.conftest import until
 from tests.service.test_stopping import Process, served

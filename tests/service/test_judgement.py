@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from service.agent import Agent, AgentConfig, ObserveOptions
-from service.compute import local
+from service.compute import in_this_process
 from store.memory import Memory
 
 
@@ -13,7 +13,7 @@ from store.memory import Memory
 def agent(tmp_path, backbone, look):
     """An agent that knows one kind of object."""
     with Memory.open(tmp_path / "memory") as memory:
-        made = Agent(local(backbone), memory, AgentConfig("best"))
+        made = Agent(in_this_process(backbone), memory, AgentConfig("best"))
         scan = made.scanning.begin(look())
         made.scanning.add(scan.id, look())
         made.scanning.complete(scan.id)

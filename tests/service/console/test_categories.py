@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from core.boxes import OrientedBox
 from core.scan import ScanOptions
 from service.agent import Agent, AgentConfig, ObserveOptions
-from service.compute import local
+from service.compute import in_this_process
 from service.console.facts import health, symmetry_words, variance_bars
 from store.connection import Connection
 from store.memory import Memory
@@ -27,7 +27,7 @@ def prepared(tmp_path_factory, colour_backbone, look):
     """A memory that knows a cup by two bursts and a mug by one, and their ids."""
     folder = tmp_path_factory.mktemp("prepared") / "memory"
     with Memory.open(folder) as memory:
-        agent = Agent(local(colour_backbone), memory, AgentConfig(score="pooled_best_view", variant="ucd"))
+        agent = Agent(in_this_process(colour_backbone), memory, AgentConfig(score="pooled_best_view", variant="ucd"))
         ids = {}
         for name, kind in (("cup", "bright"), ("mug", "dark")):
             scan = agent.scanning.begin(look(kind), ScanOptions(6))

@@ -16,7 +16,7 @@ class CalledOff(OneLookError):
     """Nobody waits for this piece of work any more."""
 
 
-class Turn:
+class Cancellation:
     """One piece of work. Safe to use from several threads."""
 
     def __init__(self) -> None:
@@ -51,12 +51,12 @@ class Turn:
             raise CalledOff("nobody waits for this any more")
 
 
-present: ContextVar[Turn | None] = ContextVar("turn", default=None)
+present: ContextVar[Cancellation | None] = ContextVar("cancellation", default=None)
 """Of the piece of work that runs here; None outside of the queue."""
 
 
 def require_wanted() -> None:
     """Raises CalledOff where nobody waits for the present piece of work any more."""
-    turn = present.get()
-    if turn is not None:
-        turn.require()
+    cancellation = present.get()
+    if cancellation is not None:
+        cancellation.require()
