@@ -1,4 +1,6 @@
-"""The root of every error OneLook raises on purpose, and the branches of the method and the memory; service/ and clients/ have their own.
+"""The root of every error OneLook raises on purpose, and the branches of the method and the memory.
+
+The service (service/refusals.py) and its client (clients/errors.py) have branches of their own.
 
 OneLookError
 ├── InvalidInput        a field of the caller's input is wrong; names the field

@@ -16,10 +16,10 @@ from fastapi import Request, Response, WebSocket
 from fastapi.routing import APIRoute
 from starlette.requests import HTTPConnection
 
-from core.errors import OneLookError
 from service.access import ADMIN, allows, needed_role
 from service.logs import robot
 from service.rate import RateLimit
+from service.refusals import NoKey, NotAllowed, TooOften
 from store.keys import Key, Keys, Role
 from store.sessions import Sessions
 
@@ -27,22 +27,6 @@ Answering = Callable[[Request], Coroutine[Any, Any, Response]]
 COOKIE = "onelook_session"
 LONGEST_ACTOR = 200
 HOW = "send the header `Authorization: Bearer KEY` (ONELOOK_API_KEY for the client and the commands)"
-
-
-class NoKey(OneLookError):
-    """Nobody knows who asks."""
-
-
-class NotAllowed(OneLookError):
-    """It is known who asks, and they may not."""
-
-
-class TooOften(OneLookError):
-    """The key's requests of this minute are used up."""
-
-    def __init__(self, message: str, retry_after_s: int) -> None:
-        super().__init__(message)
-        self.retry_after_s = retry_after_s
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from core.backbones.base import Backbone, Features
 from core.encode import EncoderConfig
 from core.errors import OneLookError, Unavailable
-from service.cancelling import CalledOff, require_wanted
+from service.cancelling import require_wanted
+from service.refusals import CalledOff
 
 Images = NDArray[np.uint8]
 LARGEST_PASS = 64

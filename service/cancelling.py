@@ -9,11 +9,7 @@ from __future__ import annotations
 import threading
 from contextvars import ContextVar
 
-from core.errors import OneLookError
-
-
-class CalledOff(OneLookError):
-    """Nobody waits for this piece of work any more."""
+from service.refusals import CalledOff
 
 
 class Cancellation:

@@ -14,10 +14,9 @@ from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
 
 from core import errors as core
-from service.auth import NoKey, NotAllowed, TooOften
 from service.logs import HEADER, request_id
+from service.refusals import Busy, NoKey, NotAllowed, TooOften
 from service.schemas.problem import MEDIA_TYPE, FieldError, Problem
-from service.work import Busy
 from store.requests import StillRunning
 
 log = logging.getLogger("onelook")

@@ -13,6 +13,7 @@ from typing import Any, Literal, TypeVar
 
 from core.errors import Unavailable
 from service.cancelling import Cancellation, present
+from service.refusals import Busy, ClientGone, TooLate
 from store.connection import before_change
 
 T = TypeVar("T")
@@ -26,22 +27,6 @@ POLL_S = 0.02
 Refusal = Literal["full", "stopping", "late", "gone"]
 Gone = Callable[[], Coroutine[Any, Any, None]]
 """Returns once whoever asked has gone away."""
-
-
-class Busy(Unavailable):
-    """The queue is full or too slow, or the service stops."""
-
-    def __init__(self, message: str, retry_after_s: int) -> None:
-        super().__init__(message)
-        self.retry_after_s = retry_after_s
-
-
-class TooLate(Unavailable):
-    """A request took longer than it may."""
-
-
-class ClientGone(Unavailable):
-    """Nobody is there to be answered."""
 
 
 class WorkQueue:

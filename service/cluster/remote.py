@@ -22,8 +22,9 @@ from core.matches import PoseEstimate
 from core.pose import PoseConfig
 from core.reference import Reference
 from core.views import Burst
-from service.cancelling import CalledOff, require_wanted
+from service.cancelling import require_wanted
 from service.compute import CategoryReference
+from service.refusals import CalledOff
 
 APPLICATION = "onelook"
 ATTEMPTS = 3

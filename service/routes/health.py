@@ -1,15 +1,15 @@
-"""Probes, and what the service says of itself."""
+"""Probes, figures, and what the service says of itself."""
 
 from __future__ import annotations
 
 from importlib.metadata import version
 
-from fastapi import APIRouter, Request
+from fastapi import APIRouter, Request, Response
 
 from core.errors import OneLookError, Unavailable
 from service.auth import GuardedRoute
 from service.batching import HANGS
-from service.deps import AgentDep
+from service.deps import AgentDep, MetricsDep
 from service.schemas.info import Health, Info
 from service.schemas.problem import problems
 
@@ -53,3 +53,13 @@ def info(agent: AgentDep) -> Info:
         categories=len(agent.memory.categories.all()),
         memory_version=agent.memory.version,
     )
+
+
+@router.get(
+    "/metrics",
+    response_class=Response,
+    responses={200: {"description": "Prometheus's text format", "content": {"text/plain": {}}}, **problems(503)},
+)
+def metrics(agent: AgentDep, counted: MetricsDep) -> Response:
+    """Figures for Prometheus."""
+    return Response(counted.text(agent.memory), media_type="text/plain; version=0.0.4")

@@ -5,9 +5,9 @@ from __future__ import annotations
 from fastapi import FastAPI
 
 from service import openapi
-from service.routes import categories, goals, health, memory, observations, scans, track
+from service.routes import categories, events, goals, health, memory, observations, scans, track
 
-ENDPOINTS = (observations, scans, categories, goals, memory, track, health)
+ENDPOINTS = (observations, scans, categories, goals, memory, events, track, health)
 ROUTERS = (*(each.router for each in ENDPOINTS), memory.live)
 
 

@@ -1,20 +1,18 @@
-"""/v1/memory: its size, and copies of it that go elsewhere; and what happens in it, as it happens."""
+"""/v1/memory: its size, and copies of it that go elsewhere."""
 
 from __future__ import annotations
 
 import tempfile
-from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Annotated, Any
 
-from fastapi import APIRouter, BackgroundTasks, Header, Query, Request, Response
+from fastapi import APIRouter, BackgroundTasks, Query, Request, Response
 from fastapi.responses import FileResponse
-from fastapi.sse import EventSourceResponse, ServerSentEvent
 from starlette.exceptions import HTTPException
 
 from service.agent import Agent
 from service.auth import GuardedRoute
-from service.deps import ActorDep, AgentDep, MetricsDep, SettingsDep, WorkDep
+from service.deps import ActorDep, AgentDep, SettingsDep, WorkDep
 from service.exchange import MemoryRoute
 from service.limits import media_type
 from service.schemas.memory import AuditEntry, AuditList, Backup, Calibrate, ExportQuery, Import, MemoryInfo, Thresholds
@@ -86,28 +84,6 @@ def list_changes(agent: AgentDep, limit: Annotated[int, Query(ge=1, le=1000, des
 def undo_change(entry_id: str, agent: AgentDep, actor: ActorDep) -> AuditEntry:
     """Takes back a rename, merge, split or deletion; answers the entry that says so."""
     return AuditEntry.of(agent.upkeep.undo(entry_id, actor=actor))
-
-
-@live.get("/v1/events", response_class=EventSourceResponse, responses=problems(422))
-async def events(
-    agent: AgentDep,
-    after: Annotated[int | None, Query(ge=0, description="First what happened after the event with this id.")] = None,
-    last_event_id: Annotated[str | None, Header(description="The same, as browsers say it when they connect again.")] = None,
-) -> AsyncIterator[ServerSentEvent]:
-    """What happens, as server-sent events: observations, scans, changes of categories. `dropped` says how many were left out."""
-    since = int(last_event_id) if last_event_id is not None and last_event_id.isdecimal() else after
-    async for event in agent.events.listen(since):
-        yield ServerSentEvent(event=event.kind, id=str(event.id), data={"created_at": event.created_at, **event.about})
-
-
-@live.get(
-    "/metrics",
-    response_class=Response,
-    responses={200: {"description": "Prometheus's text format", "content": {"text/plain": {}}}, **problems(503)},
-)
-def metrics(agent: AgentDep, counted: MetricsDep) -> Response:
-    """Figures for Prometheus."""
-    return Response(counted.text(agent.memory), media_type="text/plain; version=0.0.4")
 
 
 def imported(agent: Agent, entry_id: str) -> Import:

@@ -17,10 +17,11 @@ from core.warm import WarmConfig
 from service.agent import Agent
 from service.auth import admit_socket
 from service.errors import problem_of, validation_problem
+from service.refusals import Busy
 from service.schemas.tracking import Announcement, Dropped, FrameAnswer, FrameMessage, Hello, Ready, TrackProblem
 from service.settings import Settings
 from service.tracker import Tracker
-from service.work import Busy, WorkQueue
+from service.work import WorkQueue
 
 router = APIRouter()
 WAITING_FRAMES = 2

@@ -13,8 +13,8 @@ from core.calibration import Prior
 from core.errors import Conflict, InvalidInput, OneLookError
 from service.agent import Agent
 from service.app import create_app
-from service.auth import TooOften
 from service.errors import KINDS, problem_of
+from service.refusals import TooOften
 from service.settings import Settings
 
 

@@ -13,8 +13,9 @@ import pytest
 from fastapi.testclient import TestClient
 
 from service.app import create_app
-from service.cancelling import CalledOff, Cancellation, present, require_wanted
-from service.work import Busy, ClientGone, TooLate, WorkQueue
+from service.cancelling import Cancellation, present, require_wanted
+from service.refusals import Busy, CalledOff, ClientGone, TooLate
+from service.work import WorkQueue
 from tests.service.conftest import until
 
 SOON_S, LONG_S = 0.1, 20

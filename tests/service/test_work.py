@@ -13,7 +13,8 @@ from fastapi.testclient import TestClient
 from core.errors import Unavailable
 from service.app import create_app
 from service.batching import LARGEST_PASS, BatchingBackbone
-from service.work import Busy, WorkQueue
+from service.refusals import Busy
+from service.work import WorkQueue
 
 
 class Gate:
