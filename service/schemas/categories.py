@@ -10,6 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from core.scores import SCORES
 from service.curation import Similarities
 from service.schemas.geometry import Vector3
+from service.schemas.times import CreatedAt
 from store import records
 
 Name = Field(None, min_length=1, max_length=200, description="What people call it; null where nobody said.", examples=["cup"])
@@ -20,7 +21,7 @@ class Category(BaseModel):
 
     id: str = Field(description="Never reused.", examples=["4be0643f1d98573b97cdca98a65347dd"])
     name: str | None = Name
-    created_at: str = Field(description="ISO 8601, UTC.", examples=["2026-01-31T12:00:00.000+00:00"])
+    created_at: CreatedAt
     views: int = Field(description="Views of the reference object.", examples=[10])
     instances: int = Field(description="Bursts assigned to the category, the reference's own included.", examples=[1])
     extent_m: Vector3 = Field(description="Edge lengths of the reference's oriented box, metres.", examples=[[0.09, 0.12, 0.1]])
@@ -79,7 +80,7 @@ class Instance(BaseModel):
     """A burst assigned to a category, and where it came from."""
 
     id: str = Field(examples=["7d0a64b9a4f3a2c7e7f57d6cb1f0f6de"])
-    created_at: str = Field(description="ISO 8601, UTC.", examples=["2026-01-31T12:00:00.000+00:00"])
+    created_at: CreatedAt
     source: Literal["scan", "observation"]
     source_id: str | None = Field(description="Of that scan or observation, which may be gone since.")
     how: records.Assignment = Field(

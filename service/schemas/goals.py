@@ -7,6 +7,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from core.rearrange import Anchor
 from service import goals
 from service.schemas.geometry import Direction, Matrix4, Rigid, Similarity, as_up
+from service.schemas.times import CreatedAt
 from store import records
 
 ANCHOR = (
@@ -53,7 +54,7 @@ class Goal(BaseModel):
 
     id: str = Field(examples=["b1a4b1f8f4d94ab6a5a9cf1d5a0c2d5f"])
     category_id: str
-    created_at: str = Field(description="ISO 8601, UTC.", examples=["2026-01-31T12:00:00.000+00:00"])
+    created_at: CreatedAt
     name: str | None = GoalName
     anchor: Anchor = Field(description=ANCHOR)
     frame: str | None = Field(description="Name of the world frame that the goal is in.", examples=["map"])

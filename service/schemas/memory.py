@@ -10,6 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from service import upkeep
 from service.agent import Agent
 from service.schemas.categories import Category
+from service.schemas.times import CreatedAt
 from store import backup, records
 
 
@@ -122,7 +123,7 @@ class AuditEntry(BaseModel):
     """One change of what was learnt."""
 
     id: str
-    created_at: str = Field(description="ISO 8601, UTC.", examples=["2026-01-31T12:00:00.000+00:00"])
+    created_at: CreatedAt
     actor: str | None = Field(description="Who asked for it: the name of their key where there are keys, and what X-Actor said.")
     action: records.Action
     category_id: str | None = Field(description="The category that was changed.")

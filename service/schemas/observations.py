@@ -20,6 +20,7 @@ from service.agent import ObserveOptions
 from service.schemas import scans
 from service.schemas.geometry import Box, Direction, Matrix4, Quaternion, Similarity, Stretch, as_up
 from service.schemas.quality import Grounds
+from service.schemas.times import CreatedAt
 from store import records
 
 PixelBox = Annotated[list[float], Field(min_length=4, max_length=4)]
@@ -188,7 +189,7 @@ class Observation(BaseModel):
     """What was seen."""
 
     id: str = Field(description="Names it in /v1/observations/{id}.", examples=["9f1c1b8a4b0c4a0fb0a5c0b7f5a0d6c3"])
-    created_at: str = Field(description="ISO 8601, UTC.", examples=["2026-01-31T12:00:00.000+00:00"])
+    created_at: CreatedAt
     frame: str | None = Field(description="Name of the burst's world frame, as it was sent.", examples=["map"])
     outcome: Outcome = Field(description="`known`: recognised; `novel`: of no category so far; `uncertain`: more views would settle it.")
     views: int = Field(description="Views the answer rests on.", examples=[5])

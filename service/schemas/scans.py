@@ -13,6 +13,7 @@ from service.scanning import Progress
 from service.schemas.categories import Name
 from service.schemas.geometry import Direction, Matrix4, Vector3, as_up
 from service.schemas.quality import Fault
+from service.schemas.times import CreatedAt
 from store import records
 
 MOST_VIEWPOINTS = 64
@@ -35,7 +36,7 @@ class Scan(BaseModel):
             "`requested` before the first views, `collecting` after, `completed` once it is a category, `expired` where no views came."
         )
     )
-    created_at: str = Field(description="ISO 8601, UTC.", examples=["2026-01-31T12:00:00.000+00:00"])
+    created_at: CreatedAt
     expires_at: str = Field(
         description="When it ends unless more views come before; ISO 8601, UTC.", examples=["2026-02-01T12:00:00.000+00:00"]
     )

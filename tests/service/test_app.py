@@ -10,11 +10,11 @@ from fastapi.testclient import TestClient
 
 import service.app
 from core.calibration import Prior
-from core.errors import Conflict, InvalidInput, OneLookError
+from core.errors import Conflict, InvalidInput, OneLookError, Unavailable
 from service.agent import Agent
 from service.app import create_app
 from service.errors import KINDS, problem_of
-from service.refusals import TooOften
+from service.refusals import CalledOff, TooOften
 from service.settings import Settings
 
 
@@ -106,8 +106,9 @@ def test_every_kind_of_error_has_a_problem():
         below = kind.__subclasses__()
         return {kind} | {leaf for each in below for leaf in leaves(each)}
 
-    own = {kind for kind in leaves(OneLookError) if kind.__module__ in {"core.errors", "service.auth"}} - {OneLookError}
-    assert own == kinds
+    own = {kind for kind in leaves(OneLookError) if kind.__module__ in {"core.errors", "service.refusals"}}
+    busy = leaves(Unavailable) - {Unavailable}  # answered alike
+    assert own - busy - {OneLookError, CalledOff} == kinds  # nobody is there to be told of work that was called off
 
 
 def test_the_most_particular_kind_wins():
