@@ -12,6 +12,7 @@ import pytest
 import torch
 from transformers import Dinov2Config, Dinov2Model, Dinov2WithRegistersConfig, Dinov2WithRegistersModel, ViTConfig, ViTModel
 
+from clients.cli import bench
 from core.backbones import BACKBONES, EMBEDDED, load_backbone, weights
 from core.backbones.base import Backbone
 from core.backbones.dino import DinoBackbone, load
@@ -38,6 +39,10 @@ def tiny_folder(kind: str, folder: Path) -> Path:
 
 def test_the_folder_offers_its_backbones_by_name() -> None:
     assert {"dino-s8", EMBEDDED} <= set(BACKBONES)
+
+
+def test_benches_take_the_embedded_one() -> None:
+    assert bench.BACKBONE == EMBEDDED  # written out there: the command's help must not wait for an import
 
 
 @pytest.mark.parametrize(("kind", "patch"), [("dino", 8), ("dinov2", 14), ("registers", 14)])
