@@ -121,8 +121,9 @@ def run(
     if isinstance(first, BestPairs):
         left_out = hardest(first.single(), labels)
         fewer = np.delete(labels, left_out)
-        rows += score_rows(EASIER, first.without(left_out), fewer, draw_orders(episodes, fewer, length, seed))
-        rates = rate_rows(BEST, first, labels, orders)
+        easier, fewer_orders = first.without(left_out), draw_orders(episodes, fewer, length, seed)
+        rows += score_rows(EASIER, easier, fewer, fewer_orders)
+        rates = rate_rows(BEST, first, labels, orders) + rate_rows(EASIER, easier, fewer, fewer_orders)
     meta = {
         "benchmark": "discovery",
         "data": data,
