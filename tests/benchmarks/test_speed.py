@@ -35,6 +35,7 @@ def test_bounds_are_compared_with_ratios_of_the_same_run() -> None:
     ms = {
         "encode": 40.0,
         speed.STRAIGHTFORWARD: 100.0,
+        speed.BARE: 25.0,
         speed.NEAR: 30.0,
         "solve ucd": 6.0,
         speed.PRODUCTS: 2.0,
@@ -44,4 +45,4 @@ def test_bounds_are_compared_with_ratios_of_the_same_run() -> None:
         "solve best, 3 times the views": 135.0,
     }
     rows = [speed.SpeedRow(name, "total", each, 0.0) for name, each in ms.items()] + [speed.SpeedRow("complete depth", "alone", 4.5, 0.0)]
-    assert [row.measured for row in speed.target_rows(rows, 2.5)] == [0.4, 0.3, 3.0, 10.0, 90.0, 2.0, 1.5, 4.5, 2.5]
+    assert [row.measured for row in speed.target_rows(rows, 2.5)] == [0.4, 0.25, 0.3, 3.0, 10.0, 90.0, 2.0, 1.5, 4.5, 2.5]
