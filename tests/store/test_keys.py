@@ -80,16 +80,22 @@ def test_names_are_one_line_and_tell_keys_apart(memory: Memory) -> None:
     memory.keys.revoke(key.id)
     memory.keys.create("arm", "admin")
     for name in ("", "  ", "two\nlines", "x" * 101):
-        with pytest.raises(InvalidInput, match="name"):
+        with pytest.raises(InvalidInput, match="^name: is .*; give 1 to 100 printable characters that say who has the key$"):
             memory.keys.create(name, "robot")
+
+
+def test_a_role_that_there_is_not_is_refused(memory: Memory) -> None:
+    with pytest.raises(InvalidInput, match="^role: is 'boss'; the roles are viewer, robot, admin$"):
+        memory.keys.create("arm", "boss")
 
 
 def test_the_audit_trail_tells_of_both_ends(memory: Memory) -> None:
     key, text = memory.keys.create("arm", "robot", actor="onelook keys")
     memory.keys.revoke(key.id, actor="onelook keys")
     end, beginning = memory.audit.latest(2)
-    assert (beginning.action, beginning.after["name"], beginning.actor) == ("key", "arm", "onelook keys")
-    assert (end.action, end.before["key"]) == ("revoke", key.id)
+    about = {"key": key.id, "name": "arm", "role": "robot"}
+    assert (beginning.action, beginning.before, beginning.after, beginning.actor) == ("key", {}, about, "onelook keys")
+    assert (end.action, end.before, end.after, end.actor) == ("revoke", about, {}, "onelook keys")
     assert not end.undoable
     assert text.split("_", 2)[2] not in str(beginning.after)
 

@@ -146,6 +146,11 @@ def test_of_a_deleted_goal_that_goal_is_noted(memory: Memory, category: Category
     assert noted(memory, lambda: memory.goals.delete(goal)) == goal
 
 
+def test_of_a_deleted_scan_that_scan_is_noted(memory: Memory, request_for_views: ScanRequest) -> None:
+    scan = memory.scans.create(request_for_views).id
+    assert noted(memory, lambda: memory.scans.delete(scan)) == scan
+
+
 def test_of_a_correction_the_observation_is_noted(memory: Memory, category: Category, burst: Burst, encoded: EncodedBurst) -> None:
     seen = memory.observations.create(NOVEL, burst, {"a": np.arange(3)}).id
     assert noted(memory, lambda: memory.corrections.to_category(seen, category.id, encoded)) == seen
