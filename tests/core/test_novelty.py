@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from core.backbones.whitening import Whitening
 from core.encode import EncodedBurst
 from core.errors import InvalidInput
 from core.evidence import PATCHES
@@ -73,6 +74,12 @@ def test_best_knows_other_instances_and_finds_other_kinds_novel(painted: Painted
     assert {decide(SIX_KINDS, seen(painted, kind, 9)).outcome for kind in range(6, 12)} <= {"novel", "uncertain"}
 
 
+def test_patches_are_compared_as_the_backbone_whitens_them(painted: PaintedObject) -> None:
+    whitening = Whitening.fit(np.random.default_rng(2).normal(size=(500, 384)) * np.linspace(0.5, 2, 384) + 0.3)
+    plain, whitened = (decide(SIX_KINDS, seen(painted, 2, 9), context=Context(each)) for each in (None, whitening))
+    assert plain.similarity != whitened.similarity
+
+
 def test_evidence_does_not_depend_on_how_often_a_view_is_sent(painted: PaintedObject) -> None:
     burst = seen(painted, 2, 9)
     twice = EncodedBurst(burst.views + burst.views, "painted")
@@ -95,6 +102,25 @@ def test_verification_adds_evidence_for_the_shortlist_only(painted: PaintedObjec
     assert (plain.verified, verified.verified) == (False, True)
     assert verified.similarity > plain.similarity
     assert verified.margin > plain.margin
+
+
+PAST = Decision("novel", "best", 0.3, (), rival=0.6)
+
+
+def test_what_earlier_bursts_came_near_to_raises_the_threshold(painted: PaintedObject) -> None:
+    burst = seen(painted, 2, 9)
+    assert decide(SIX_KINDS, burst, context=Context(past=[PAST] * 300)).threshold > decide(SIX_KINDS, burst).threshold + 0.1
+
+
+@pytest.mark.parametrize("other", [replace(PAST, verified=True), replace(PAST, rival=None)])
+def test_only_rivals_by_the_same_evidence_count(other: Decision, painted: PaintedObject) -> None:
+    burst = seen(painted, 2, 9)
+    assert decide(SIX_KINDS, burst, context=Context(past=[other] * 300)).threshold == decide(SIX_KINDS, burst).threshold
+
+
+def test_with_poses_the_threshold_is_another_one(painted: PaintedObject) -> None:
+    burst = seen(painted, 2, 9)
+    assert decide(SIX_KINDS, burst, context=Context(verify=lambda category: 0.0)).threshold != decide(SIX_KINDS, burst).threshold
 
 
 def test_a_stricter_rate_asks_for_more_and_learning_for_more_still(painted: PaintedObject) -> None:

@@ -80,6 +80,12 @@ def test_only_the_sum_grows_with_the_number_of_views() -> None:
     assert np.isclose(best_view(doubled, tokens), best_view(tokens, tokens))
 
 
+def test_each_view_is_compared_with_its_most_similar_one_by_hand() -> None:
+    burst, target = np.eye(2), np.array([[1.0, 0], [0.6, 0.8], [0, -1]])
+    of_the_target, of_the_burst = (1 + 0.8 + 0) / 3, (1 + 0.8) / 2
+    assert best_view(burst, target) == pytest.approx((of_the_target + of_the_burst) / 2)
+
+
 @pytest.mark.parametrize(("name", "similarity"), [("paper_sum", paper_sum), ("paper_mean", paper_mean)])
 def test_the_paper_takes_all_views_of_a_category_as_one_set(name: str, similarity: Callable[[np.ndarray, np.ndarray], float]) -> None:
     *bursts, target = bursts_of(SCORES[name], 3, 1, 4, 2)
