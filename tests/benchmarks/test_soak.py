@@ -13,7 +13,7 @@ import pytest
 from benchmarks import soak
 
 ROOT = Path(__file__).parents[2]
-MINUTES = 1.0
+MINUTES = 1.5
 MOST_GROWTH = 0.05
 
 
@@ -34,5 +34,5 @@ def process(tmp_path: Path) -> Iterator[str]:
 
 def test_hundreds_of_errands_leave_the_process_as_it_was(process: str, recorded: Path, tmp_path: Path) -> None:
     result = soak.run(MINUTES, MOST_GROWTH, plot=tmp_path / "soak.png", robots=2, views=3, data=recorded, url=process)
-    assert result.answered > 75
+    assert result.answered > 110
     assert result.refused == 0  # two robots for a worker and four places

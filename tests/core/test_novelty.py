@@ -133,7 +133,7 @@ def test_a_stricter_rate_asks_for_more_and_learning_for_more_still(painted: Pain
 def test_between_the_levels_the_answer_is_uncertain_and_names_candidates(painted: PaintedObject) -> None:
     burst = seen(painted, 2, 9)
     clear = decide(SIX_KINDS, burst)
-    rates = np.geomspace(1e-9, 0.5, 60)
+    rates = np.geomspace(1e-9, 0.5, 20)
     outcomes = [decide(SIX_KINDS, burst, DecisionConfig(false_known_rate=rate)).outcome for rate in rates]
     assert outcomes == sorted(outcomes, key=["novel", "uncertain", "known"].index)
     assert {"uncertain", "known"} <= set(outcomes)
@@ -157,7 +157,7 @@ def test_looks_that_cannot_be_are_refused() -> None:
 @pytest.mark.parametrize(("kind", "probable"), [(2, True), (9, False)])
 def test_an_uncertain_object_counts_as_what_is_more_probable(kind: int, probable: bool, painted: PaintedObject) -> None:
     burst = seen(painted, kind, 9)
-    asked = (decide(SIX_KINDS, burst, DecisionConfig(false_known_rate=rate)) for rate in np.geomspace(1e-9, 0.5, 60))
+    asked = (decide(SIX_KINDS, burst, DecisionConfig(false_known_rate=rate)) for rate in np.geomspace(1e-9, 0.5, 20))
     unsure = next(decision for decision in asked if decision.outcome == "uncertain")
     assert (unsure.probability > 0.5) == probable
     assert (unsure.rival == unsure.similarity) == (not probable)
