@@ -68,7 +68,7 @@ unit: setup browser
 fuzz: setup ## feed everything that reads uploads what breaks it, ten minutes long; what it finds is kept in OUT
 	@$(BIN)/python -m tests.fuzz --seconds $(FUZZ_SECONDS) --found $(OUT)/fuzz
 
-mutants: setup ## change what core/sim3.py, core/correspond.py, core/novelty.py, core/scores/ and store/ do, a little at a time: which changes does no test notice?
+mutants: setup ## which small changes of sim3, correspond, novelty, the scores and store/ does no test notice?
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[mutants]'
 	@OMP_NUM_THREADS=1 $(BIN)/python -m tests.mutants
 

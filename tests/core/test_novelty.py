@@ -10,9 +10,9 @@ import pytest
 from core.backbones.whitening import Whitening
 from core.encode import EncodedBurst
 from core.errors import InvalidInput
-from core.evidence import PATCHES
+from core.evidence import PATCHES, whitened
 from core.novelty import Context, Decision, DecisionConfig, Member, decide
-from core.scores import SCORES
+from core.scores import BEST, SCORES
 
 from .conftest import PaintedObject
 
@@ -25,7 +25,7 @@ def burst_of(painted: PaintedObject, tokens: np.ndarray) -> EncodedBurst:
 def test_an_empty_memory_finds_everything_novel(painted: PaintedObject) -> None:
     decision = decide([], burst_of(painted, np.eye(2, 48)))
     assert decision.outcome == "novel"
-    assert decision.similarities == ()
+    assert (decision.similarities, decision.similarity, decision.probability, decision.rival) == ((), None, None, None)
 
 
 @pytest.mark.parametrize("score", sorted(SCORES))
@@ -69,6 +69,7 @@ SIX_KINDS = [member(kind, seed) for kind in range(6) for seed in range(2)]
 
 def test_best_knows_other_instances_and_finds_other_kinds_novel(painted: PaintedObject) -> None:
     known = [decide(SIX_KINDS, seen(painted, kind, 9)) for kind in range(6)]
+    assert {decision.score for decision in known} == {BEST}
     assert [decision.outcome for decision in known] == ["known"] * 6
     assert [decision.similarities[0][0] for decision in known] == [f"kind {kind}" for kind in range(6)]
     assert {decide(SIX_KINDS, seen(painted, kind, 9)).outcome for kind in range(6, 12)} <= {"novel", "uncertain"}
@@ -76,8 +77,11 @@ def test_best_knows_other_instances_and_finds_other_kinds_novel(painted: Painted
 
 def test_patches_are_compared_as_the_backbone_whitens_them(painted: PaintedObject) -> None:
     whitening = Whitening.fit(np.random.default_rng(2).normal(size=(500, 384)) * np.linspace(0.5, 2, 384) + 0.3)
-    plain, whitened = (decide(SIX_KINDS, seen(painted, 2, 9), context=Context(each)) for each in (None, whitening))
-    assert plain.similarity != whitened.similarity
+    by_hand = [replace(each, patches=whitened(each.patches, whitening)) for each in SIX_KINDS]
+    told = decide(SIX_KINDS, seen(painted, 2, 9), context=Context(whitening))
+    asked = painted.with_tokens(whitened(kind_of_tokens(2, 9), whitening))
+    assert told.similarity == pytest.approx(decide(by_hand, asked).similarity, abs=1e-3)
+    assert told.similarity != pytest.approx(decide(SIX_KINDS, seen(painted, 2, 9)).similarity, abs=1e-3)
 
 
 def test_evidence_does_not_depend_on_how_often_a_view_is_sent(painted: PaintedObject) -> None:

@@ -99,5 +99,5 @@ def test_the_most_similar_burst_speaks_for_its_category() -> None:
 
 
 def test_an_unknown_score_is_answered_with_all_there_are() -> None:
-    with pytest.raises(InvalidInput, match=f"'nonsense' is none of {', '.join((BEST, *SCORES))}$"):
+    with pytest.raises(InvalidInput, match=f"^score: 'nonsense' is none of {', '.join((BEST, *SCORES))}$"):
         require_score("nonsense")
