@@ -26,7 +26,7 @@ class Remembering:
     """A backbone that looks at a picture once: where depth and cameras get worse, pictures stay."""
 
     def __init__(self, backbone: Backbone) -> None:
-        self._backbone = backbone
+        self.inner = backbone
         self._seen: dict[bytes, Features] = {}
         self.name, self.patch_size, self.dim = backbone.name, backbone.patch_size, backbone.dim
         self.has_saliency, self.whitening, self.fingerprint = backbone.has_saliency, backbone.whitening, backbone.fingerprint
@@ -36,7 +36,7 @@ class Remembering:
         keys = [hashlib.sha256(f"{image.shape}".encode() + image.tobytes()).digest() for image in images]
         new = {key: index for index, key in enumerate(keys) if key not in self._seen}
         if new:
-            features = self._backbone.extract(images[list(new.values())])
+            features = self.inner.extract(images[list(new.values())])
             self._seen |= {key: features.part(slice(place, place + 1)) for place, key in enumerate(new)}
         return Features.joined([self._seen[key] for key in keys])
 

@@ -85,7 +85,8 @@ def write_encoded(file: Path, encoded: EncodedBurst) -> None:
 
 def encoder_key(encoder: Encoder) -> str:
     """What an encoding depends on beside the burst."""
-    own = hashlib.sha256(Path(inspect.getfile(type(encoder.backbone))).read_bytes()).hexdigest()
+    backbone = getattr(encoder.backbone, "inner", encoder.backbone)  # of one that remembers, the one that looks
+    own = hashlib.sha256(Path(inspect.getfile(type(backbone))).read_bytes()).hexdigest()
     return f"{encoder.backbone.fingerprint} {encoder.config} {code_hash(SOURCES)} {own}"
 
 

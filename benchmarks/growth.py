@@ -124,12 +124,12 @@ def run(
             asked = [tokens.burst(category, ASKED, views) for category in right]
             rows.append(measure(Probe(Path(folder), asked, right, tokens.burst(10**9 + count, ASKED, views), rounds, count <= exact_up_to)))
             before = count
-    if plot is not None:
-        plot_growth(plot, rows, f"{views} views a burst, one burst a category")
     meta = {"benchmark": "growth", "views": views, "rounds": rounds, "seed": seed}
     match = {"recorded": asdict(recorded), "synthetic": asdict(synthetic)}
     print_table("How well bursts match", [{"bursts": bursts, **levels} for bursts, levels in match.items()], LEVELS)
     report(f"Growth, {views} views a burst, {rounds} decisions", rows, meta | match, json)
+    if plot is not None:
+        plot_growth(plot, rows, f"{views} views a burst, one burst a category")
     return rows
 
 

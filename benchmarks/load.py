@@ -76,10 +76,10 @@ def run(
         teach(url, sequences)
         errand = observing([folders.load_burst(each, range(views)) for each in sequences])
         rows = [load_row(count, seconds, record) for count, record in _levels(url, robots, seconds, errand, seed)]
-    if plot is not None:
-        plot_load(plot, rows, f"{views} views an observation, {seconds:.0f} s each")
     meta = {"benchmark": "load", "seconds": seconds, "views": views, "seed": seed}
     report(f"Load, {views} views an observation, {seconds:.0f} s each", rows, meta, json)
+    if plot is not None:
+        plot_load(plot, rows, f"{views} views an observation, {seconds:.0f} s each")
     return rows
 
 

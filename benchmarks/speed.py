@@ -119,8 +119,6 @@ def run(
     }
     rows = table_rows(_rounds(operations, rounds), OBSERVATION)
     targets = [asdict(row) for row in target_rows(rows, _megabytes(reference))]
-    if plot is not None:
-        speed_plot.plot(plot, _waterfall(rows), f"{views} views against a reference of {views}, {torch.get_num_threads()} threads")
     meta = {
         "benchmark": "speed",
         "views": views,
@@ -132,6 +130,8 @@ def run(
     }
     report(f"Speed, {views} + {views} views, {torch.get_num_threads()} threads", rows, meta, json)
     print_table("Against its bounds", targets, ("target", "measured", "bound"))
+    if plot is not None:
+        speed_plot.plot(plot, _waterfall(rows), f"{views} views against a reference of {views}, {torch.get_num_threads()} threads")
     return rows
 
 
@@ -232,6 +232,8 @@ def _complete(rng: np.random.Generator) -> dict[str, float]:
 def _bare_passes(network: Backbone, config: EncoderConfig, views: int, device: str) -> None:
     for grid in (config.first_grid, config.grid):
         transformer_products.bare_products(grid, network.dim, views, device, fast_dtype(device))
+    if device != "cpu":
+        torch.cuda.synchronize()
 
 
 def _without_stages(function: Callable[..., object], *arguments: object) -> dict[str, float]:

@@ -43,7 +43,7 @@ def report(title: str, rows: Sequence[DataclassInstance], meta: Meta, json: Path
     told = [asdict(row) for row in rows]
     if json is not None:
         write_json(json, meta, told)
-    print_table(title, told, columns or list(told[0]))
+    print_table(title, told, columns or (list(told[0]) if told else ()))
 
 
 def print_table(title: str, rows: Sequence[Row], columns: Sequence[str]) -> None:

@@ -5,6 +5,7 @@ Nothing between the products is computed (norms, softmax, activations, residuals
 
 from __future__ import annotations
 
+import numpy as np
 import torch
 from torch.nn.functional import linear
 
@@ -14,19 +15,26 @@ BLOCKS = 12
 HEAD_DIM = 64
 WIDENING = 4
 """Of the two layers between attention and attention. These are the sizes of every ViT-S and ViT-B."""
+TOGETHER = 8
+"""Images that share products at most, as in the backbone."""
 
 
 @torch.inference_mode()
 def bare_products(grid: int, dim: int, images: int, device: str, dtype: torch.dtype) -> None:
     """The products for `images` of `grid` by `grid` patches and a [CLS], as many at a time as the backbone takes on a CPU."""
     tokens = 1 + grid * grid
-    together = max(1, CACHED_TOKENS // tokens)
-    rows = torch.zeros(together * tokens, dim, device=device, dtype=dtype)
-    wide = torch.zeros(together * tokens, WIDENING * dim, device=device, dtype=dtype)
+    together = min(TOGETHER, max(1, CACHED_TOKENS // tokens))
+    for part in np.array_split(range(images), -(-images // together)):
+        _products(len(part), tokens, dim, device, dtype)
+
+
+def _products(images: int, tokens: int, dim: int, device: str, dtype: torch.dtype) -> None:
+    rows = torch.zeros(images * tokens, dim, device=device, dtype=dtype)
+    wide = torch.zeros(images * tokens, WIDENING * dim, device=device, dtype=dtype)
     square, widen = (torch.zeros(factor * dim, dim, device=device, dtype=dtype) for factor in (1, WIDENING))
     narrow = torch.zeros(dim, WIDENING * dim, device=device, dtype=dtype)
-    heads = torch.zeros(together * dim // HEAD_DIM, tokens, HEAD_DIM, device=device, dtype=dtype)
-    for _ in range(-(-images // together) * BLOCKS):
+    heads = torch.zeros(images * dim // HEAD_DIM, tokens, HEAD_DIM, device=device, dtype=dtype)
+    for _ in range(BLOCKS):
         for _ in range(4):  # query, key, value, and what goes out
             linear(rows, square)
         (heads @ heads.transpose(1, 2)) @ heads

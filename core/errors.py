@@ -9,6 +9,7 @@ OneLookError
 ├── NoPose              the input is fine, but no transform explains it
 ├── NotFound            no such category, scan or observation
 ├── Conflict            the thing is in a state that does not allow this
+│   └── StillRunning    (store/requests.py) the first request with a key is not answered yet
 └── Unavailable         weights, disk or queue cannot serve this now
 """
 

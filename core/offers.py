@@ -1,4 +1,4 @@
-"""What the files of a folder offer, by name: adding a file there is all that adding an estimator, a score or a data set takes.
+"""What the files of a folder offer, by name: adding a file there is all that adding a backbone, an estimator, a score or a data set takes.
 
 A file offers what its `OFFERS` says; a file without `OFFERS` is what the others share.
 """

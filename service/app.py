@@ -124,7 +124,7 @@ def open_agent(settings: Settings, metrics: Metrics, backbone: Backbone | None, 
 
         chosen = compute or in_this_process(BatchingBackbone(backbone or warm_backbone(settings), metrics.count_pass, settings.deadline_s))
         agent = Agent(chosen, opened, config, Events(tell))
-        if config.score == BEST and agent.backbone.fingerprint != Prior.shipped().fingerprint:
+        if config.score == BEST and config.threshold is None and agent.backbone.fingerprint != Prior.shipped().fingerprint:
             log.warning("thresholds start from figures of another backbone, %s, until the memory has decisions of its own", EMBEDDED)
         try:
             yield agent

@@ -56,8 +56,10 @@ class Requests:
         self._running: set[tuple[str, str]] = set()
 
     @contextmanager
-    def once(self, key: str, route: str, digest: str) -> Iterator[Once]:
+    def once(self, key: str, route: str, digest: str, *, retold: bool = True) -> Iterator[Once]:
         """What is done inside counts as done for `key` on `route`; `digest` is the body's.
+
+        Where an answer was lost and cannot be `retold` from what the request made, the request is begun anew.
 
         Raises Conflict where the key came with another body, StillRunning where its first request is not answered yet.
         """
@@ -65,7 +67,7 @@ class Requests:
         with self._lock:
             if request in self._running:
                 raise StillRunning(f"the request with Idempotency-Key {key!r} is still being answered; repeat it later")
-            earlier = self._begin(key, route, digest)
+            earlier = self._begin(key, route, digest, retold)
             if earlier is None:
                 self._running.add(request)
         if earlier is not None:
@@ -93,13 +95,14 @@ class Requests:
         with self._connection.housekeeping() as db:
             db.execute("DELETE FROM requests WHERE created_at <= ?", [ago(self._connection.retention.requests)])
 
-    def _begin(self, key: str, route: str, digest: str) -> Earlier | None:
+    def _begin(self, key: str, route: str, digest: str, retold: bool) -> Earlier | None:
         row = only(self._connection.rows("SELECT * FROM requests WHERE key = ? AND route = ?", key, route))
         if row is not None and row["created_at"] > ago(self._connection.retention.requests):
             if row["digest"] != digest:
                 raise Conflict(f"Idempotency-Key {key!r} was used for another request; take a new key for each request")
             reply = None if row["status"] is None else Reply(row["status"], row["media_type"], row["body"])
-            return Earlier(reply, row["result_id"])
+            if reply is not None or retold:
+                return Earlier(reply, row["result_id"])
         with self._connection.housekeeping() as db:
             db.table("requests").insert({"key": key, "route": route, "digest": digest, "created_at": now()}, replace=True)
         return None

@@ -16,6 +16,8 @@ from clients.cli import bench
 from core.backbones import BACKBONES, EMBEDDED, load_backbone, weights
 from core.backbones.base import Backbone
 from core.backbones.dino import DinoBackbone, load
+from core.calibration import Prior
+from core.confidence import Confidence
 from core.errors import Unavailable
 
 ARCHITECTURE = Path(__file__).parents[2] / "docs" / "architecture.md"
@@ -92,6 +94,10 @@ def test_batches_do_not_change_features(tmp_path: Path, monkeypatch: pytest.Monk
     two_and_one = load_backbone(str(folder), dtype=torch.float32).extract(IMAGES).patches
     assert np.allclose(whole, one_by_one, atol=1e-5)
     assert np.allclose(whole, two_and_one, atol=1e-5)
+
+
+def test_what_ships_was_measured_with_the_embedded_one(embedded_backbone: Backbone) -> None:
+    assert Prior.shipped().fingerprint == Confidence.shipped().fingerprint == embedded_backbone.fingerprint
 
 
 @pytest.mark.parametrize("kind", ["dino", "dinov2", "registers"])

@@ -148,7 +148,7 @@ def ball_memory(tmp_path_factory: Any, colour_backbone: Any, look: Any, parts: A
 @pytest.fixture
 def ball(ball_memory: tuple[Path, dict[str, Any]]) -> dict[str, Any]:
     """A category that the service knows from its start."""
-    return ball_memory[1]
+    return dict(ball_memory[1])
 
 
 @pytest.fixture

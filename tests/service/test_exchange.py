@@ -97,13 +97,14 @@ def test_whatever_is_made_can_be_answered_again(client):
     assert made <= set(client.app.state.made)
 
 
-def test_a_plan_lost_with_the_process_is_made_anew(client, learn, look, parts):
+def test_a_plan_lost_with_the_process_is_made_anew_once(client, learn, look, parts):
     goal = client.post(f"/v1/categories/{learn()['id']}/goals", files=parts(look())).json()
     path = f"/v1/goals/{goal['id']}/plan"
     first = client.post(path, files=parts(look()), headers=KEY).json()
     lose_answers(client)
     again = client.post(path, files=parts(look()), headers=KEY)
     assert (again.status_code, again.json()["goal_from_current"]) == (200, first["goal_from_current"])
+    assert client.post(path, files=parts(look()), headers=KEY).json()["observation_id"] == again.json()["observation_id"]
 
 
 def test_the_same_request_twice_at_once_is_done_once(settings, backbone, look, parts):

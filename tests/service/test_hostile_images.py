@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import struct
-import time
 import tracemalloc
 import zipfile
 import zlib
@@ -111,16 +110,14 @@ BOMBS = {
 
 
 @pytest.mark.parametrize("bomb", BOMBS)
-def test_image_bombs_take_neither_memory_nor_time(client, look, parts, bomb):
+def test_image_bombs_take_no_memory(client, look, parts, bomb):
     files = parts(look(), lambda about, files: files["rgb"].__setitem__(1, BOMBS[bomb]))
     tracemalloc.start()
-    started = time.monotonic()
     answer = client.post("/v1/observations", files=files)
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert answer.status_code in {201, 422}, answer.text
     assert peak < 60_000_000
-    assert time.monotonic() - started < 20
 
 
 def npz_of(entries, compression=zipfile.ZIP_DEFLATED):

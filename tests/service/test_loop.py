@@ -67,7 +67,6 @@ def test_one_view_is_enough_for_a_target(client, look, parts, ball):
 
 
 def test_photographs_without_depth_and_cameras_are_recognised_without_a_pose(client, look, parts, ball):
-
     seen = client.post("/v1/observations", files=parts(look("bright"), colour_only)).json()
     assert (seen["outcome"], seen["pose"]) == ("known", None)
     assert "K" in seen["pose_error"]

@@ -46,6 +46,17 @@ def test_a_change_without_an_answer_is_known_by_what_it_made(folder: Path, reque
         assert (again.earlier.reply, again.earlier.result_id) == (None, scan.id)
 
 
+def test_a_lost_answer_that_cannot_be_told_again_is_made_anew_once(folder: Path, request_for_views: ScanRequest) -> None:
+    with Memory.open(folder) as memory, memory.requests.once("k", "r", "d", retold=False):
+        memory.scans.create(request_for_views)
+    with Memory.open(folder) as memory:
+        with memory.requests.once("k", "r", "d", retold=False) as anew:
+            assert anew.earlier is None
+            anew.reply = DONE
+        with memory.requests.once("k", "r", "d", retold=False) as again:
+            assert again.earlier.reply == DONE
+
+
 def test_work_that_failed_may_be_tried_again(memory: Memory) -> None:
     with pytest.raises(RuntimeError), memory.requests.once("k", "r", "d"):
         raise RuntimeError
