@@ -22,7 +22,7 @@ COUNTS = {
 
 @dataclass(frozen=True)
 class Sizes:
-    """See module."""
+    """What lives, counted, and the bytes of all that is kept."""
 
     categories: int
     instances: int
