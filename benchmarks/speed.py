@@ -112,10 +112,10 @@ def run(
     operations |= {
         STRAIGHTFORWARD: partial(_encode, exact, target_burst),
         NEAR: partial(_encode, near, target_burst),
-        BARE: partial(_without_stages, _bare_passes, network, encoder.config, views, device),
         "complete depth, 640 by 480": partial(_complete, np.random.default_rng(0)),
         PRODUCTS: partial(_without_stages, zero_shot_pose.bare_products, *reduced.descriptors),
         RECIPE: partial(_without_stages, zero_shot_pose.solve, whole, threshold_m, 0),
+        BARE: partial(_without_stages, _bare_passes, network, encoder.config, views, device),
     }
     rows = table_rows(_rounds(operations, rounds), OBSERVATION)
     targets = [asdict(row) for row in target_rows(rows, _megabytes(reference))]
