@@ -5,26 +5,22 @@ Nothing between the products is computed (norms, softmax, activations, residuals
 
 from __future__ import annotations
 
-import numpy as np
 import torch
 from torch.nn.functional import linear
 
-from core.backbones.dino import CACHED_TOKENS
+from core.backbones.dino import passes
 
 BLOCKS = 12
 HEAD_DIM = 64
 WIDENING = 4
 """Of the two layers between attention and attention. These are the sizes of every ViT-S and ViT-B."""
-TOGETHER = 8
-"""Images that share products at most, as in the backbone."""
 
 
 @torch.inference_mode()
 def bare_products(grid: int, dim: int, images: int, device: str, dtype: torch.dtype) -> None:
-    """The products for `images` of `grid` by `grid` patches and a [CLS], as many at a time as the backbone takes on a CPU."""
+    """The products for `images` of `grid` by `grid` patches and a [CLS], as many at a time as the backbone takes."""
     tokens = 1 + grid * grid
-    together = min(TOGETHER, max(1, CACHED_TOKENS // tokens))
-    for part in np.array_split(range(images), -(-images // together)):
+    for part in passes(images, tokens, device):
         _products(len(part), tokens, dim, device, dtype)
 
 

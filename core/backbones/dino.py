@@ -26,6 +26,8 @@ PREPROCESSING = "rgb-imagenet-1"
 MATCHING_LAYER = 9
 """Block, counted from 0, whose tokens serve as descriptors. The embedded weights' last block was fine-tuned for
 saliency; block 9 of 12 matched best across instances, and serves the paper's DINO as well (Amir et al. 2021)."""
+BATCH = 8
+"""Images that share a pass, where nothing else is said."""
 CACHED_TOKENS = 2400
 """Of a pass on a CPU: what lies between two layers then stays in the processor's cache, and a pass takes a quarter less."""
 PRODUCTS = "onelook_products"
@@ -45,7 +47,7 @@ class DinoBackbone:
         whitening: Whitening | None = None,
         device: str = "cpu",
         dtype: torch.dtype = torch.float32,
-        batch: int = 8,
+        batch: int = BATCH,
     ) -> None:
         config = model.config
         self.name = name
@@ -77,15 +79,10 @@ class DinoBackbone:
         )
         for count in np.unique(counts[counts > 0]):
             alike = np.flatnonzero(counts == count)
-            for part in np.array_split(alike, -(-len(alike) // self._together(int(count)))):
+            for places in passes(len(alike), self._prefix + int(count), self._device, self._batch):
+                part = alike[places]
                 self._forward(images[part, :, :, :3], shown[part], features, part)
         return features
-
-    def _together(self, patches: int) -> int:
-        """Images of so many patches that share a pass."""
-        if torch.device(self._device).type != "cpu":
-            return self._batch
-        return min(self._batch, max(1, CACHED_TOKENS // (self._prefix + patches)))
 
     @torch.inference_mode()
     def _forward(self, images: NDArray[np.uint8], shown: NDArray[np.bool_], into: Features, rows: NDArray[np.intp]) -> None:
@@ -136,6 +133,12 @@ class DinoBackbone:
         logits = torch.einsum("vhd,vthd->vht", query[:, 0], key) * (self.dim // self._heads) ** -0.5
         attention: Tensor = logits.softmax(dim=-1)[:, :, self._prefix :].mean(dim=1)
         return torch.div(attention, attention.amax(dim=1, keepdim=True))
+
+
+def passes(images: int, tokens: int, device: str, batch: int = BATCH) -> list[NDArray[np.intp]]:
+    """Which of so many images, of so many tokens each, share a pass: up to `batch`, and on a CPU no more than its cache holds."""
+    together = min(batch, max(1, CACHED_TOKENS // tokens)) if torch.device(device).type == "cpu" else batch
+    return np.array_split(np.arange(images), -(-images // together))
 
 
 def fast_dtype(device: str) -> torch.dtype:
