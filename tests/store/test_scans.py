@@ -16,6 +16,14 @@ from core.views import Burst
 from store.memory import Memory
 
 
+@pytest.fixture
+def completed(memory: Memory, request_for_views: ScanRequest, reference: Reference, burst: Burst, encoded: EncodedBurst) -> str:
+    """The id of a scan that became a category."""
+    scan = memory.scans.create(request_for_views)
+    memory.categories.create(reference, burst, encoded, scan_id=scan.id)
+    return scan.id
+
+
 def test_a_scan_keeps_its_request(memory: Memory, request_for_views: ScanRequest) -> None:
     scan = memory.scans.create(request_for_views)
     assert (scan.state, scan.views) == ("requested", 0)
@@ -58,13 +66,9 @@ def test_completing_makes_one_category_and_frees_the_views(
     assert len(memory.categories.all()) == 1
 
 
-def test_a_completed_scan_takes_no_more_views(
-    memory: Memory, request_for_views: ScanRequest, reference: Reference, burst: Burst, encoded: EncodedBurst
-) -> None:
-    scan = memory.scans.create(request_for_views)
-    memory.categories.create(reference, burst, encoded, scan_id=scan.id)
+def test_a_completed_scan_takes_no_more_views(memory: Memory, completed: str, burst: Burst) -> None:
     with pytest.raises(Conflict, match="completed"):
-        memory.scans.add(scan.id, burst)
+        memory.scans.add(completed, burst)
 
 
 def test_deleting_forgets_rows_and_views(memory: Memory, request_for_views: ScanRequest, burst: Burst) -> None:
@@ -91,13 +95,9 @@ def test_a_scan_may_ask_for_other_viewpoints(memory: Memory, request_for_views: 
     assert (changed.id, changed.request.radius_m, changed.state) == (scan.id, 0.5, "requested")
 
 
-def test_a_completed_scan_asks_for_nothing_more(
-    memory: Memory, request_for_views: ScanRequest, reference: Reference, burst: Burst, encoded: EncodedBurst
-) -> None:
-    scan = memory.scans.create(request_for_views)
-    memory.categories.create(reference, burst, encoded, scan_id=scan.id)
+def test_a_completed_scan_asks_for_nothing_more(memory: Memory, completed: str, request_for_views: ScanRequest) -> None:
     with pytest.raises(Conflict, match="completed"):
-        memory.scans.replace_request(scan.id, request_for_views)
+        memory.scans.replace_request(completed, request_for_views)
 
 
 def test_scans_are_counted_by_state(memory: Memory, request_for_views: ScanRequest, burst: Burst) -> None:
