@@ -62,8 +62,9 @@ types: setup
 browser:
 	@command -v chromium >/dev/null || $(if $(filter 0,$(shell id -u)),$(INSTALL_BROWSER),{ echo "the console's tests need Chromium; run: sudo apt-get install chromium" >&2; false; })
 
+# Two processes of one thread each; `worksteal`, since the other ways to share tests out lose those that have one name.
 unit: setup browser
-	@$(BIN)/pytest
+	@OMP_NUM_THREADS=1 $(BIN)/pytest --numprocesses 2 --dist worksteal
 
 fuzz: setup ## feed everything that reads uploads what breaks it, ten minutes long; what it finds is kept in OUT
 	@$(BIN)/python -m tests.fuzz --seconds $(FUZZ_SECONDS) --found $(OUT)/fuzz
