@@ -18,7 +18,6 @@ from core.backbones.weights import cache_folder
 from core.backbones.whitening import Whitening
 from core.encode import EncodedBurst
 from core.errors import InvalidInput, NoPose
-from core.evidence import sample_patches
 from core.novelty import Context, Decision, Member, decide
 from core.reference import Reference, build_reference
 from core.sim3 import Sim3
@@ -133,5 +132,4 @@ def _reference(known: Known) -> Reference:
 
 @cache
 def _member(known: Known) -> Member:
-    burst = _seen(known)
-    return Member(known.category, burst.cls, burst.pooled, sample_patches(burst))
+    return Member.of(known.category, _seen(known))

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from benchmarks.agreements import agreements
 from benchmarks.encoded import encode_all, read_views
+from benchmarks.episodes import labels_of
 from benchmarks.matches import matches
 from benchmarks.parallel import bar
 from clients.datasets.folders import find_sequences
@@ -36,7 +37,7 @@ def main(data: Annotated[Path, typer.Option(help="folder of bursts")], out: Anno
     files = encode_all(sequences, Encoder(backbone))
     with bar() as progress:
         bursts = [read_views(file) for file in progress.track(files, description="reading")]
-    labels = np.unique([sequence.category for sequence in sequences], return_inverse=True)[1]
+    labels = labels_of(sequences)
     match, agreement = matches(bursts, backbone.whitening)[0], agreements(files, backbone.whitening)
     typer.echo(f"wrote {write(out, backbone.fingerprint, labels, match, agreement)}")
 

@@ -22,7 +22,7 @@ from benchmarks.agreements import agreements
 from benchmarks.best_pairs import BestPairs, BestSource
 from benchmarks.discovery_plot import plot
 from benchmarks.encoded import encode_all, read_views
-from benchmarks.episodes import Counts, SetSource, draw_orders, episode
+from benchmarks.episodes import Counts, SetSource, draw_orders, episode, labels_of
 from benchmarks.matches import matches
 from benchmarks.pair_scores import FloatArray, PairScores, auroc, hardest, nearest_accuracy, same_and_other
 from benchmarks.parallel import map_jobs
@@ -102,8 +102,9 @@ def run(
     for score in scores:
         require_score(score)
     sequences = find_sequences(data)
-    names, labels = np.unique([sequence.category for sequence in sequences], return_inverse=True)
-    if len(names) < 2 or np.bincount(labels).max() < 2:
+    labels = labels_of(sequences)
+    objects = np.bincount(labels)
+    if len(objects) < 2 or objects.max() < 2:
         raise InvalidInput("data", "discovery needs two categories, and two objects of one of them")
     network = load_backbone(backbone)
     files = encode_all(sequences, Encoder(network))
@@ -131,7 +132,7 @@ def run(
         "episodes": episodes,
         "length": length,
         "sequences": len(sequences),
-        "categories": len(names),
+        "categories": len(objects),
         "backbone": network.name,
         "fingerprint": network.fingerprint,
         "hardest": None if left_out is None else sequences[left_out].name,

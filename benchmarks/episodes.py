@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.pair_scores import FloatArray, PairScores
+from clients.datasets import folders
 
 MOST_CATEGORIES, MOST_SEQUENCES = 20, 10
 """The paper's episodes: 10 sequences of each of 20 categories, where there are as many."""
@@ -159,6 +160,11 @@ def episode(source: Source, labels: NDArray[np.intp], order: Sequence[int], thre
         categories[:, position], truth[position] = used, len(kinds)
     one = [np.array([each]) for each in (presented, seen, len(order) - presented)]
     return Counts(wrong_sum[None], missed_sum[None], one[0], one[1], repeat_sum[None], one[2], categories, truth)
+
+
+def labels_of(sequences: Sequence[folders.Sequence]) -> NDArray[np.intp]:
+    """The true category of each burst as a number from 0 on, shape (N,)."""
+    return np.unique([sequence.category for sequence in sequences], return_inverse=True)[1]
 
 
 def draw_orders(count: int, labels: NDArray[Any], length: int, seed: int) -> list[list[int]]:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from benchmarks.best_pairs import single_evidence
 from benchmarks.encoded import encode_all, read_views
+from benchmarks.episodes import labels_of
 from benchmarks.matches import STAGES, adapted, match_table
 from benchmarks.pair_scores import FloatArray, auroc, nearest_accuracy, same_and_other
 from benchmarks.parallel import map_jobs
@@ -57,7 +58,7 @@ def main(
     backbone = load_backbone(report=typer.echo)
     sequences = find_sequences(data)
     files = tuple(encode_all(sequences, Encoder(backbone)))
-    labels = np.unique([sequence.category for sequence in sequences], return_inverse=True)[1]
+    labels = labels_of(sequences)
     choices = varied(len(files))
     tables = dict.fromkeys(replace(choice, cohort=COHORT) for choice in choices.values())
     matches = dict(

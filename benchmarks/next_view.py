@@ -27,7 +27,6 @@ from core.backbones import EMBEDDED, load_backbone
 from core.camera_poses import angles_about_deg
 from core.encode import EncodedBurst, Encoder
 from core.errors import InvalidInput, NoObject, NoPose
-from core.evidence import sample_patches
 from core.next_view import OFFERED, Candidate, next_viewpoints
 from core.novelty import Context, Decision, DecisionConfig, Member, decide
 from core.packing import burst_as_arrays, burst_from_arrays
@@ -250,5 +249,4 @@ def _reference(file: Path) -> Reference:
 
 @cache
 def _member(category: str, file: Path) -> Member:
-    encoded = _scan(file)
-    return Member(category, encoded.cls, encoded.pooled, sample_patches(encoded))
+    return Member.of(category, _scan(file))

@@ -30,7 +30,6 @@ from core.boxes import cloud_extent_m
 from core.depth import complete
 from core.encode import EncodedBurst, Encoder, EncoderConfig
 from core.errors import InvalidInput
-from core.evidence import sample_patches
 from core.matched_pair import MatchedPair
 from core.novelty import VERIFIED, Context, DecisionConfig, Member, decide
 from core.pose import VARIANTS, PoseConfig, PoseEstimator
@@ -103,7 +102,7 @@ def run(
         MatchedPair(reference, target, dims, zero_shot_pose.CORRESPONDENCES, "cyclical") for dims in (PoseConfig().dims, None)
     )
     threshold_m = PoseConfig().inlier_ratio * cloud_extent_m(target.cloud_m)
-    memory = [Member("reference", scanned.cls, scanned.pooled, sample_patches(scanned))]
+    memory = [Member.of("reference", scanned)]
     operations: dict[str, Operation] = {"encode": partial(_encode, encoder, target_burst), "learn": partial(_learn, scanned)}
     operations |= {f"decide {score}": partial(_decide, memory, target, score) for score in (BEST, *SCORES)}
     operations |= {f"decide {BEST}, {VERIFIED} poses": partial(_verify, memory[0], target, reference, network.whitening)}

@@ -8,6 +8,9 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 
+ROOM_FOR_MS = 1.12
+"""The axis, of the longest bar's end: its milliseconds are written behind it."""
+
 
 def plot(file: Path, stages: Sequence[tuple[str, float, float]], title: str) -> None:
     """A waterfall. `stages` are a name, milliseconds, and milliseconds of the straightforward way, NaN where there is none."""
@@ -15,15 +18,17 @@ def plot(file: Path, stages: Sequence[tuple[str, float, float]], title: str) -> 
     from matplotlib import pyplot
 
     figure, axes = pyplot.subplots(figsize=(9, 0.45 * len(stages) + 1.4), constrained_layout=True)
-    start = 0.0
-    for place, (name, ms, straightforward_ms) in enumerate(stages):
+    start = end = 0.0
+    for place, (_, ms, straightforward_ms) in enumerate(stages):
         axes.barh(place, straightforward_ms, left=start, height=0.7, color="0.88", label="straightforward" if place == 0 else None)
         axes.barh(place, ms, left=start, height=0.7, color="tab:blue", label="as it is" if place == 0 else None)
-        axes.text(start + np.nanmax([ms, straightforward_ms]), place, f" {name}, {ms:.0f} ms", va="center")
-        start += ms
+        longest = start + float(np.nanmax([ms, straightforward_ms]))
+        axes.text(longest, place, f" {ms:.0f} ms", va="center", color="tab:blue")
+        start, end = start + ms, max(end, longest)
     axes.invert_yaxis()
-    axes.set(yticks=[], xlabel="milliseconds", title=title)
-    axes.set_xlim(0, 1.8 * start)
+    axes.set(xlabel="milliseconds", title=title)
+    axes.set_yticks(range(len(stages)), [name for name, _, _ in stages])
+    axes.set_xlim(0, ROOM_FOR_MS * end)
     axes.legend(loc="lower left")
     figure.savefig(file, dpi=110)
     pyplot.close(figure)

@@ -41,6 +41,11 @@ class Member:
     patches: FloatArray | None = None
     """Of `core.evidence.sample_patches`, shape (V, K, D)."""
 
+    @classmethod
+    def of(cls, category_id: str, burst: EncodedBurst) -> Member:
+        """What the memory holds of a burst that was assigned to a category."""
+        return cls(category_id, burst.cls, burst.pooled, sample_patches(burst))
+
 
 @dataclass(frozen=True)
 class DecisionConfig:

@@ -5,7 +5,8 @@ Commands import what they need when they run: torch and Open3D take seconds, `on
 
 from __future__ import annotations
 
-from typing import Any
+from importlib.metadata import version
+from typing import Annotated, Any
 
 import typer
 from rich.markup import escape
@@ -48,6 +49,21 @@ app = typer.Typer(
     no_args_is_help=True,
     pretty_exceptions_show_locals=False,
 )
+
+
+def _say_version(asked: bool) -> None:
+    if asked:
+        typer.echo(f"onelook {version('onelook')}")
+        raise typer.Exit
+
+
+@app.callback()
+def onelook(
+    asked: Annotated[bool, typer.Option("--version", callback=_say_version, is_eager=True, help="Say which version this is.")] = False,
+) -> None:
+    """What goes before any command."""
+
+
 app.command("serve", cls=service.ServeCommand)(service.serve)
 app.command("doctor")(doctor.doctor)
 app.command("observe")(robot.observe)

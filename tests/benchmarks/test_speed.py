@@ -17,13 +17,14 @@ def test_medians_and_ratios() -> None:
     assert rows == {("look", "total"): (15, 0.75), ("solve", "match"): (1, 0.05), ("solve", "total"): (5, 0.25)}
 
 
-def test_every_stage_is_timed(recorded: Path, monkeypatch: pytest.MonkeyPatch, backbone) -> None:
+def test_every_stage_is_timed_and_drawn(recorded: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, backbone) -> None:
     monkeypatch.setattr(speed, "load_backbone", lambda name, device, dtype=None: backbone)
     monkeypatch.setattr(speed, "WARM_UP", 0)
-    rows = speed.run(None, data=recorded, views=2, rounds=1)
+    rows = speed.run(None, data=recorded, views=2, rounds=1, plot=tmp_path / "speed.png")
     totals = {row.operation for row in rows if row.stage == "total"}
     assert {"encode", "learn", "decide best, 3 poses", *(f"solve {variant}" for variant in VARIANTS)} <= totals
     assert sum(row.ratio for row in rows if row.stage == "total" and row.operation in speed.OBSERVATION) == pytest.approx(1)
+    assert (tmp_path / "speed.png").stat().st_size > 10_000
 
 
 def test_two_objects_with_enough_views_are_needed(recorded: Path) -> None:

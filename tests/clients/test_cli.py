@@ -6,6 +6,7 @@ import json
 import subprocess
 import sys
 from collections.abc import Iterator
+from importlib.metadata import version
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -38,6 +39,11 @@ def test_help_names_every_command_without_heavy_imports() -> None:
     page = onelook("--help").output
     assert all(name in page for name in ("serve", "observe", "scan", "categories", "memory", "simulate", "samples", "bench"))
     assert all(name in onelook("bench", "--help").output for name in ("pose", "discovery", "speed", "isolation"))
+
+
+def test_it_says_the_version_that_is_installed() -> None:
+    said = onelook("--version")
+    assert (said.exit_code, said.output) == (0, f"onelook {version('onelook')}\n")
 
 
 def test_an_object_is_taught_named_recognised_and_forgotten(url: str, recordings: list[Sequence]) -> None:

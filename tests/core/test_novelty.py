@@ -10,7 +10,7 @@ import pytest
 from core.backbones.whitening import Whitening
 from core.encode import EncodedBurst
 from core.errors import InvalidInput
-from core.evidence import PATCHES, whitened
+from core.evidence import PATCHES, sample_patches, whitened
 from core.novelty import Context, Decision, DecisionConfig, Member, decide
 from core.scores import BEST, SCORES
 
@@ -65,6 +65,15 @@ def seen(painted: PaintedObject, kind: int, seed: int, views: int = 4) -> Encode
 
 
 SIX_KINDS = [member(kind, seed) for kind in range(6) for seed in range(2)]
+
+
+def test_of_a_burst_the_memory_holds_its_tokens_and_a_sample_of_its_patches(painted: PaintedObject) -> None:
+    burst = seen(painted, 0, 0)
+    held = Member.of("kind 0", burst)
+    assert held.category_id == "kind 0"
+    assert held.cls is burst.cls
+    assert held.pooled is burst.pooled
+    assert np.array_equal(held.patches, sample_patches(burst))
 
 
 def test_best_knows_other_instances_and_finds_other_kinds_novel(painted: PaintedObject) -> None:
