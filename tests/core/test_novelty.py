@@ -71,9 +71,8 @@ def test_of_a_burst_the_memory_holds_its_tokens_and_a_sample_of_its_patches(pain
     burst = seen(painted, 0, 0)
     held = Member.of("kind 0", burst)
     assert held.category_id == "kind 0"
-    assert held.cls is burst.cls
-    assert held.pooled is burst.pooled
-    assert np.array_equal(held.patches, sample_patches(burst))
+    for kept, tokens in ((held.cls, burst.cls), (held.pooled, burst.pooled), (held.patches, sample_patches(burst))):
+        assert np.array_equal(kept, tokens)
 
 
 def test_best_knows_other_instances_and_finds_other_kinds_novel(painted: PaintedObject) -> None:
