@@ -16,10 +16,11 @@ from benchmarks.pairs import ViewCounts
 from benchmarks.parallel import map_jobs
 from benchmarks.tables import report
 from core.backbones import load_backbone
+from core.best_pose import BestConfig
 from core.encode import Encoder
 from core.errors import NoPose
 from core.hypotheses import HypothesesConfig
-from core.pose import VARIANTS, BestConfig, PoseConfig, PoseEstimator
+from core.pose import VARIANTS, PoseConfig, PoseEstimator
 
 _BEST = BestConfig()
 _GUESSES = HypothesesConfig()

@@ -13,27 +13,25 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.cached import code_hash, write
 from benchmarks.encoded import read_encoded
 from benchmarks.parallel import map_jobs
-from core.agreement import agreeing
 from core.backbones.weights import cache_folder
 from core.backbones.whitening import Whitening
 from core.encode import EncodedBurst
 from core.errors import OneLookError
 from core.reference import Reference, build_reference
 from core.verification import verify
+from core.view_consistency import consistent_only
+from core.views import FloatArray
 
-FloatArray = NDArray[np.floating[Any]]
 VIEWS = 8
 """Of a longer burst so many, evenly spaced, stand for it: a robot's burst is about as long, and a solve takes less time."""
 SOURCES = (
-    "agreement.py",
+    "best_pose.py",
     "boxes.py",
     "correspond.py",
     "dense.py",
@@ -42,15 +40,17 @@ SOURCES = (
     "estimators/base.py",
     "estimators/batched.py",
     "estimators/ransac.py",
+    "evidence.py",
     "hypotheses.py",
     "matched_pair.py",
     "matches.py",
-    "normals.py",
     "pose.py",
+    "pose_estimate.py",
     "reference.py",
     "sim3.py",
     "surface.py",
     "verification.py",
+    "view_consistency.py",
     "viewpoints.py",
 )
 """Files of core/ that decide what an agreement is: changed code never meets an old row."""
@@ -96,7 +96,7 @@ def few_views(burst: EncodedBurst) -> EncodedBurst:
     """At most VIEWS of the views that show an object, evenly spaced."""
     shown = [index for index, view in enumerate(burst.views) if len(view.cells)]
     chosen = np.unique(np.linspace(0, len(shown) - 1, min(VIEWS, len(shown))).round().astype(int))
-    return agreeing(burst.select([shown[index] for index in chosen]))
+    return consistent_only(burst.select([shown[index] for index in chosen]))
 
 
 @cache

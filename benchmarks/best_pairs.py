@@ -6,7 +6,6 @@ Letters: T memories side by side, C categories (room for them), H bursts held, S
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +14,8 @@ from benchmarks.matches import STAGES
 from core.calibration import Prior
 from core.evidence import COHORT, SHORTLIST, cohort_level
 from core.novelty import VERIFIED
+from core.views import FloatArray
 
-FloatArray = NDArray[np.floating[Any]]
 IntArray = NDArray[np.intp]
 
 

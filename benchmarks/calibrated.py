@@ -15,8 +15,9 @@ from dataclasses import astuple, dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.best_pairs import BestPairs, BestSource, FloatArray, IntArray
+from benchmarks.best_pairs import BestPairs, BestSource, IntArray
 from core.calibration import Calibration, Samples
+from core.views import FloatArray
 
 RATES = (0.005, 0.01, 0.02, 0.05)
 """False-known rates asked for."""

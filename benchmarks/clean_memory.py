@@ -13,7 +13,6 @@ import numpy as np
 from benchmarks.agreements import SOURCES
 from benchmarks.cached import code_hash, write
 from benchmarks.encoded import read_encoded, read_views
-from core.agreement import agreeing
 from core.backbones.weights import cache_folder
 from core.backbones.whitening import Whitening
 from core.encode import EncodedBurst
@@ -22,6 +21,7 @@ from core.novelty import Context, Decision, Member, decide
 from core.reference import Reference, build_reference
 from core.sim3 import Sim3
 from core.verification import verify
+from core.view_consistency import consistent_only
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ def lay(known: Known, target: Path, whitening: Whitening | None, seed: int) -> L
     names = f"{code_hash(SOURCES)} {known.file.stem} {known.views} {target.stem} {seed}"
     file = cache_folder() / "laid" / f"{hashlib.sha256(names.encode()).hexdigest()[:32]}.npz"
     if not file.exists():
-        laid = _lay(known, agreeing(read_encoded(target)), whitening, seed)
+        laid = _lay(known, consistent_only(read_encoded(target)), whitening, seed)
         matrix = np.zeros((4, 4)) if laid.target_from_reference is None else laid.target_from_reference.as_matrix()
         write(file, lambda stream: np.savez(stream, allow_pickle=False, matrix=matrix, agreement=laid.agreement))
     with np.load(file, allow_pickle=False) as arrays:
@@ -85,7 +85,7 @@ def decide_by(memory: Sequence[Known], category: str, target: Path, whitening: W
     Args:
         poses: whether the poses of the likeliest categories' first bursts verify.
     """
-    burst = agreeing(read_encoded(target))
+    burst = consistent_only(read_encoded(target))
     if not any(len(view.cells) for view in burst.views):
         return UNSEEN
     founders: dict[str, Known] = {}

@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 import typer
@@ -26,8 +26,7 @@ from core.backbones import load_backbone
 from core.calibration import SHIPPED
 from core.encode import Encoder
 from core.evidence import COHORT, cohort_level
-
-FloatArray = NDArray[np.floating[Any]]
+from core.views import FloatArray
 
 
 def main(data: Annotated[Path, typer.Option(help="folder of bursts")], out: Annotated[Path, typer.Option()] = SHIPPED) -> None:

@@ -24,7 +24,7 @@ from benchmarks.discovery_plot import plot
 from benchmarks.encoded import encode_all, read_views
 from benchmarks.episodes import Counts, SetSource, draw_orders, episode, labels_of
 from benchmarks.matches import matches
-from benchmarks.pair_scores import FloatArray, PairScores, auroc, hardest, nearest_accuracy, same_and_other
+from benchmarks.pair_scores import PairScores, auroc, hardest, nearest_accuracy, same_and_other
 from benchmarks.parallel import map_jobs
 from benchmarks.tables import Row, print_table, write_json
 from clients.datasets.sources import find_sequences
@@ -33,6 +33,7 @@ from core.calibration import Calibration, Prior
 from core.encode import EncodedBurst, Encoder
 from core.errors import InvalidInput
 from core.scores import BEST, SCORES, require_score
+from core.views import FloatArray
 
 LEVELS = np.concatenate([np.linspace(0, 0.9, 7), 1 - np.geomspace(0.1, 0.001, 10)])
 """Quantiles of the similarities between bursts at which a curve has a threshold."""

@@ -20,10 +20,10 @@ from numpy.typing import NDArray
 from benchmarks.cached import code_hash, write
 from benchmarks.parallel import bar
 from clients.datasets import folders
-from core.agreement import agreeing
 from core.backbones.weights import cache_folder
 from core.encode import EncodedBurst, Encoder
 from core.packing import burst_as_arrays, burst_from_arrays
+from core.view_consistency import consistent_only
 
 SOURCES = (
     "views.py",
@@ -70,7 +70,7 @@ def read_encoded(file: Path) -> EncodedBurst:
 def read_views(file: Path, indices: list[int] | None = None) -> EncodedBurst:
     """The views at `indices`, all where None, as the service would have them of a robot that sent no others."""
     whole = read_encoded(file)
-    return agreeing(whole if indices is None else whole.select(indices))
+    return consistent_only(whole if indices is None else whole.select(indices))
 
 
 def write_encoded(file: Path, encoded: EncodedBurst) -> None:

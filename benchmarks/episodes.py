@@ -17,8 +17,9 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.pair_scores import FloatArray, PairScores
+from benchmarks.pair_scores import PairScores
 from clients.datasets import folders
+from core.views import FloatArray
 
 MOST_CATEGORIES, MOST_SEQUENCES = 20, 10
 """The paper's episodes: 10 sequences of each of 20 categories, where there are as many."""

@@ -17,7 +17,7 @@ from benchmarks.best_pairs import single_evidence
 from benchmarks.encoded import encode_all, read_views
 from benchmarks.episodes import labels_of
 from benchmarks.matches import STAGES, adapted, match_table
-from benchmarks.pair_scores import FloatArray, auroc, nearest_accuracy, same_and_other
+from benchmarks.pair_scores import auroc, nearest_accuracy, same_and_other
 from benchmarks.parallel import map_jobs
 from benchmarks.tables import Row, print_table, write_json
 from clients.datasets.sources import find_sequences
@@ -26,6 +26,7 @@ from core.backbones.whitening import Whitening
 from core.calibration import Prior
 from core.encode import Encoder
 from core.evidence import COHORT, PATCHES, sample_patches, whitened
+from core.views import FloatArray
 
 COLUMNS = ("change", "auroc", "nearest")
 

@@ -8,10 +8,8 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.cached import code_hash, write
 from benchmarks.parallel import bar
@@ -19,8 +17,8 @@ from core.backbones.weights import cache_folder
 from core.backbones.whitening import Whitening
 from core.encode import EncodedBurst
 from core.evidence import Adaptation, match_views, sample_patches, whitened
+from core.views import FloatArray
 
-FloatArray = NDArray[np.floating[Any]]
 STAGES = (0, 8, 32)
 """Bursts that a memory holds at least for a stage; with fewer than the second it has the shipped statistics."""
 

@@ -22,7 +22,6 @@ from clients.simulator.raycast.categories import RECIPES
 from clients.simulator.raycast.export import around
 from clients.simulator.raycast.model import Model
 from clients.simulator.raycast.world import RaycastWorld
-from core.agreement import agreeing
 from core.backbones import EMBEDDED, load_backbone
 from core.camera_poses import angles_about_deg
 from core.encode import EncodedBurst, Encoder
@@ -33,6 +32,7 @@ from core.packing import burst_as_arrays, burst_from_arrays
 from core.reference import Reference, build_reference
 from core.scan import ScanOptions, request_scan
 from core.verification import verify
+from core.view_consistency import consistent_only
 from core.views import Burst, FloatArray, View
 
 SCANNED = 10
@@ -233,7 +233,7 @@ def _encoder(backbone: str) -> Encoder:
 
 
 def _encode(views: Sequence[View], backbone: str) -> EncodedBurst:
-    return agreeing(_encoder(backbone).encode(Burst(tuple(views))))
+    return consistent_only(_encoder(backbone).encode(Burst(tuple(views))))
 
 
 @cache

@@ -12,7 +12,7 @@ from clients.datasets.folders import Sequence as Recording
 from clients.datasets.sources import find_sequences
 from clients.pose_error import rotation_error_deg
 from core.encode import EncodedBurst, Encoder
-from core.matches import PoseEstimate
+from core.pose_estimate import PoseEstimate
 from core.reference import Reference, build_reference
 
 

@@ -18,8 +18,7 @@ from scipy.stats import rankdata
 
 from core.encode import EncodedBurst
 from core.scores.base import Aggregation, Score
-
-FloatArray = NDArray[np.floating[Any]]
+from core.views import FloatArray
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,12 +12,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from core.errors import InvalidInput, NoPose
-from core.sim3 import Sim3
+from core.sim3 import Sim3, homogeneous
+from core.views import FloatArray
 
-FloatArray = NDArray[np.floating]
 MIN_CORRESPONDENCES = 4
 PLANE_TOLERANCE = 1e-6
 """Smallest variance of the points over their largest below which they count as lying in one plane."""
@@ -52,10 +51,7 @@ class Affine9:
 
     def as_matrix(self) -> FloatArray:
         """[[R diag(s), t], [0, 1]], shape (4, 4)."""
-        matrix = np.eye(4)
-        matrix[:3, :3] = self.rotation * self.scales
-        matrix[:3, 3] = self.translation
-        return matrix
+        return homogeneous(self.rotation * self.scales, self.translation)
 
     def apply(self, points: FloatArray) -> FloatArray:
         """Points of frame a, shape (*, 3), in frame b."""

@@ -14,10 +14,24 @@ from numpy.typing import NDArray
 from core.affine9 import Affine9
 from core.errors import NoObject
 from core.foreground import fit_plane
-from core.sim3 import Sim3
-from core.views import Camera
+from core.sim3 import Sim3, homogeneous
+from core.views import Camera, FloatArray
 
-FloatArray = NDArray[np.floating]
+BOX_EDGES = tuple((a, a | 1 << axis) for a in range(8) for axis in range(3) if not a & 1 << axis)
+"""Pairs of corner indices that make the twelve edges."""
+MIN_POINTS = 8
+NEIGHBOURS = 10
+OUTLIER_DEVIATIONS = 2.0
+"""A point whose mean distance to its neighbours is this many standard deviations above the cloud's mean is an outlier.
+The appendix uses a fixed distance (5e-5 m), which depends on resolution; this does not."""
+SUPPORT_THICKNESS = 0.015
+"""Distance to the plane, as a share of the cloud's extent, up to which points are of it."""
+SUPPORT_MAX_SHARE = 0.75
+"""A plane with a larger share of the points is the object itself: a picture, a screen."""
+SUPPORT_ONE_SIDE = 0.95
+"""Share of the other points that must stand on the cameras' side of a support."""
+SUPPORT_SPREAD = 1.5
+"""How much wider than what stands on it a support must be; the face of a box is as wide as the box."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,36 +67,14 @@ class OrientedBox:
 
     def moved_by(self, target_from_reference: Sim3) -> OrientedBox:
         """The box on the target: its frame stays rigid, the scale goes into the extent."""
-        moved = np.eye(4)
-        moved[:3, :3] = target_from_reference.rotation @ self.world_from_object[:3, :3]
-        moved[:3, 3] = target_from_reference.apply(self.world_from_object[:3, 3])
-        return OrientedBox(moved, self.extent_m * target_from_reference.scale)
+        rotation = target_from_reference.rotation @ self.world_from_object[:3, :3]
+        center = target_from_reference.apply(self.world_from_object[:3, 3])
+        return OrientedBox(homogeneous(rotation, center), self.extent_m * target_from_reference.scale)
 
     def stretched_by(self, target_from_object: Affine9) -> OrientedBox:
         """The box on the target, for a transform of its own frame with a scale for each axis."""
-        moved = np.eye(4)
-        moved[:3, :3], moved[:3, 3] = target_from_object.rotation, target_from_object.translation
+        moved = homogeneous(target_from_object.rotation, target_from_object.translation)
         return OrientedBox(moved, self.extent_m * target_from_object.scales)
-
-
-BOX_EDGES = tuple((a, a | 1 << axis) for a in range(8) for axis in range(3) if not a & 1 << axis)
-"""Pairs of corner indices that make the twelve edges."""
-
-MIN_POINTS = 8
-NEIGHBOURS = 10
-OUTLIER_DEVIATIONS = 2.0
-"""A point whose mean distance to its neighbours is this many standard deviations above the cloud's mean is an outlier.
-The appendix uses a fixed distance (5e-5 m), which depends on resolution; this does not."""
-
-
-SUPPORT_THICKNESS = 0.015
-"""Distance to the plane, as a share of the cloud's extent, up to which points are of it."""
-SUPPORT_MAX_SHARE = 0.75
-"""A plane with a larger share of the points is the object itself: a picture, a screen."""
-SUPPORT_ONE_SIDE = 0.95
-"""Share of the other points that must stand on the cameras' side of a support."""
-SUPPORT_SPREAD = 1.5
-"""How much wider than what stands on it a support must be; the face of a box is as wide as the box."""
 
 
 def remove_support(points: FloatArray, cameras: FloatArray) -> FloatArray:
@@ -147,9 +139,7 @@ def oriented_box(points: FloatArray) -> OrientedBox:
     axes = np.asarray(box.R)
     if np.linalg.det(axes) < 0:
         axes = axes * np.array([1.0, 1.0, -1.0])
-    world_from_object = np.eye(4)
-    world_from_object[:3, :3], world_from_object[:3, 3] = axes, np.asarray(box.center)
-    return OrientedBox(world_from_object, np.asarray(box.extent))
+    return OrientedBox(homogeneous(axes, np.asarray(box.center)), np.asarray(box.extent))
 
 
 def cloud_extent_m(points: FloatArray) -> float:

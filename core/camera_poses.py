@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from core.errors import InvalidInput
+from core.sim3 import homogeneous
 from core.views import FloatArray
 
 ELEVATION_RANGE_DEG = (15.0, 70.0)
@@ -71,10 +72,7 @@ def look_at(position_m: FloatArray, aim_m: FloatArray, up: FloatArray) -> FloatA
         raise InvalidInput("position", "is straight above or at the aim, so the camera's roll is not determined")
     z = forward / np.linalg.norm(forward)
     x = right / np.linalg.norm(right)
-    pose = np.eye(4)
-    pose[:3, :3] = np.stack([x, np.cross(z, x), z], axis=1)
-    pose[:3, 3] = position_m
-    return pose
+    return homogeneous(np.stack([x, np.cross(z, x), z], axis=1), position_m)
 
 
 def nearest_view(world_from_camera: FloatArray, candidates: FloatArray, center_m: FloatArray) -> tuple[int, float]:

@@ -10,15 +10,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from core.boxes import cloud_extent_m
 from core.encode import EncodedBurst, EncodedView
 from core.errors import InvalidInput
 from core.quality import ViewFault
-from core.views import Burst
+from core.views import Burst, FloatArray
 
-FloatArray = NDArray[np.floating]
 MOST_APART = 3.0
 """Times by which depth and cameras may disagree about how far the object is. In 426 bursts of 3, 5 and 8 views of recordings the factor is
 0.88 to 1.1; millimetres taken for metres make it 1000."""

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.special import expit
 
-FloatArray = NDArray[np.floating]
+from core.views import FloatArray
+
 SHIPPED = Path(__file__).parent / "backbones" / "statistics" / "confidence.json"
 CLEAR_MARGIN = 1.0
 """Largest log ratio of scores that counts; also that of a hypothesis without a rival."""

@@ -16,6 +16,8 @@ from torch import Tensor
 from core.views import FloatArray
 
 METHODS = ("nearest", "mutual", "cyclical", "cyclical-3d")
+TIE_BREAK = 1e-3
+"""Weight of 1 − cosine beside the cycle's length: too small to outweigh one patch or a few millimetres."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +112,3 @@ def _nearest(reference: PatchSet, target: PatchSet, pairs: Iterable[tuple[int, i
         cosine[m, n, : len(here)] = similarity[np.arange(len(here)), nearest]
         usable[m, n, : len(here)] = True
     return torch.from_numpy(cosine), torch.from_numpy(to_target), torch.from_numpy(to_reference), torch.from_numpy(usable)
-
-
-TIE_BREAK = 1e-3
-"""Weight of 1 − cosine beside the cycle's length: too small to outweigh one patch or a few millimetres."""

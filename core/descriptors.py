@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.errors import InvalidInput
+from core.views import FloatArray
 
-FloatArray = NDArray[np.float32]
+Float32Array = NDArray[np.float32]
 KEPT_COMPONENTS = 64
 """Components kept with a reference; the paper uses 32 and at most 32 are asked for by default."""
 
@@ -21,15 +22,15 @@ KEPT_COMPONENTS = 64
 class PcaBasis:
     """Principal components of one reference's foreground tokens."""
 
-    mean: FloatArray
+    mean: Float32Array
     """Shape (D,)."""
-    components: FloatArray
+    components: Float32Array
     """Orthonormal rows, largest variance first, shape (C, D)."""
-    explained: FloatArray
+    explained: Float32Array
     """Share of the variance along each, shape (C,)."""
 
     @staticmethod
-    def fit(tokens: FloatArray, count: int = KEPT_COMPONENTS) -> PcaBasis:
+    def fit(tokens: Float32Array, count: int = KEPT_COMPONENTS) -> PcaBasis:
         """From tokens, shape (N, D); at most min(N, D, count) components, each with the sign that makes its largest entry positive."""
         mean = tokens.mean(axis=0, dtype=np.float64)
         centred = tokens - mean
@@ -40,12 +41,12 @@ class PcaBasis:
         explained = variances[::-1][:kept].clip(0) / max(float(variances.sum()), 1e-12)
         return PcaBasis(mean.astype(np.float32), (components * signs[:, None]).astype(np.float32), explained.astype(np.float32))
 
-    def project(self, tokens: FloatArray, count: int | None = None) -> FloatArray:
+    def project(self, tokens: Float32Array, count: int | None = None) -> Float32Array:
         """Coordinates along the first `count` components, shape (N, C), not normalised."""
         return (tokens - self.mean) @ self.components[:count].T
 
 
-def unit(vectors: NDArray[np.floating]) -> FloatArray:
+def unit(vectors: FloatArray) -> Float32Array:
     """Vectors scaled to length 1 along the last axis; zero stays zero."""
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
     return np.asarray(vectors / np.maximum(length, 1e-12), dtype=np.float32)

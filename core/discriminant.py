@@ -18,8 +18,8 @@ from scipy.spatial import cKDTree
 
 from core.boxes import cloud_extent_m
 from core.encode import EncodedView
+from core.views import FloatArray
 
-FloatArray = NDArray[np.floating]
 SAME_POINT = 0.03
 """Patches of different views nearer than this share of the object's extent show one point; about the size of a patch."""
 MOST_PAIRS = 5000

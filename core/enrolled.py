@@ -16,15 +16,14 @@ from typing import Protocol, TypeVar
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
 from core.backbones.whitening import Whitening
 from core.encode import EncodedBurst
 from core.evidence import Adaptation, Comparison, best_matching, match_views, sample_patches, whitened
 from core.nearness import Listed, Nearness
+from core.views import FloatArray
 
-FloatArray = NDArray[np.floating]
 T = TypeVar("T")
 
 EXACT = 64

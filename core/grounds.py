@@ -43,7 +43,7 @@ class Grounds:
 
 
 def grounds(burst: Burst, found: EncodedBurst, agreed: EncodedBurst) -> Grounds:
-    """Of a burst, what was found in it, and what of that its views agree about (`core.agreement`)."""
+    """Of a burst, what was found in it, and what of that its views agree about (`core.view_consistency`)."""
     shown = [view for view in agreed.views if len(view.cells)]
     alone = (faults(view, region_of_encoded(seen)) for view, seen in zip(burst.views, found.views))
     told = tuple(own + beside for own, beside in zip(alone, incoherent(burst, found)))

@@ -49,7 +49,7 @@ def propose(pair: MatchedPair, config: HypothesesConfig, threshold_m: float, see
     ranked = [(int(each[0]), int(each[1])) for each in np.argwhere(similarity > 0)]
     ranked.sort(key=lambda each: -similarity[each])
     if not ranked:
-        return _none()
+        return Sim3Batch.empty()
 
     def fit(pairs: Pairs, trials: int, keep: int) -> Sim3Batch:
         source, aim = end_points(pool(pair.found, pairs), pair.reference, pair.target)
@@ -85,7 +85,7 @@ def distinct(transforms: Sim3Batch, scores: torch.Tensor, angle_deg: float, coun
 def _best_samples(source: FloatArray, target: FloatArray, threshold_m: float, trials: int, keep: int, seed: int) -> Sim3Batch:
     """The samples with the most inliers, each refitted to them."""
     if len(source) < MIN_CORRESPONDENCES:
-        return _none()
+        return Sim3Batch.empty()
     transforms, inliers = sample(source, target, threshold_m, trials, seed)
     best = inliers.sum(dim=1).topk(min(keep, len(transforms))).indices
     weights = inliers[best].double()
@@ -116,7 +116,3 @@ def align_clouds(rotations: FloatArray, reference: Surface, target: Surface) -> 
     centers = [torch.from_numpy(np.median(surface.points_m, axis=0)).float() for surface in (reference, target)]
     rotation = torch.from_numpy(rotations).float()
     return Sim3Batch(torch.full((len(rotation),), size_ratio), rotation, centers[1] - size_ratio * (rotation @ centers[0]))
-
-
-def _none() -> Sim3Batch:
-    return Sim3Batch(torch.zeros(0), torch.zeros(0, 3, 3), torch.zeros(0, 3))

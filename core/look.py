@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
-from core.agreement import agreeing
 from core.coherence import require_one_unit
 from core.encode import EncodedBurst
 from core.grounds import Grounds, grounds
+from core.view_consistency import consistent_only
 from core.views import Burst
 
 
@@ -34,6 +34,6 @@ class Look:
 def look(burst: Burst, encoder: Encodes) -> Look:
     """Raises NoObject where no view shows an object, InvalidInput where depth and cameras are in different units."""
     found = encoder.encode(burst)
-    agreed = agreeing(found)
+    agreed = consistent_only(found)
     require_one_unit(agreed)
     return Look(burst, agreed, grounds(burst, found, agreed))

@@ -1,21 +1,18 @@
-"""What a pose estimate is made of: correspondences, the transform, its rivals.
+"""Correspondences of chosen view pairs: pooled, marked as inliers or not, and what they join, points and rays.
 
-Letters: M reference views, N target views, K correspondences.
+Letters: K correspondences.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from core.affine9 import Affine9
-from core.boxes import OrientedBox
 from core.correspond import PairMatches
 from core.encode import EncodedView
-from core.sim3 import Sim3
 from core.views import FloatArray
 
 
@@ -44,58 +41,6 @@ class Matches:
             return int((self.inlier & (self.reference_view == pair[0]) & (self.target_view == pair[1])).sum())
 
         return max(pairs, key=inliers)
-
-
-@dataclass(frozen=True, eq=False)
-class Alternative:
-    """Another pose that explains the views nearly as well."""
-
-    target_from_reference: Sim3
-    score: float
-    confidence: float | None = None
-    """As the estimate's."""
-
-
-@dataclass(frozen=True, eq=False)
-class PoseEstimate:
-    """A target's pose and what it rests on."""
-
-    target_from_reference: Sim3
-    matches: Matches
-    view_similarity: FloatArray
-    """S, shape (M, N)."""
-    pairs: tuple[tuple[int, int], ...]
-    """(reference view, target view) pairs whose correspondences were used."""
-    residual_m: float
-    """Root mean square distance over the inliers, metres of the target."""
-    score: float | None = None
-    """How well the pose explains both objects (`core.dense`, times the agreement of view pairs), where the variant computes it."""
-    confidence: float | None = None
-    """Probability that the rotation is within 30° (`core.confidence`), where the variant estimates one."""
-    alternatives: tuple[Alternative, ...] = ()
-    target_from_object: Affine9 | None = None
-    """From the frame of the reference's box, with a scale for each of its axes, where 9-D was asked for and is determined.
-    `target_from_reference` is then its similarity."""
-    not_9d_because: str | None = None
-    """Why there is none though it was asked for."""
-    stage_ms: dict[str, float] = field(default_factory=dict)
-
-    @property
-    def inliers(self) -> int:
-        """Correspondences that agree with the transform."""
-        return int(self.matches.inlier.sum())
-
-    def matrix(self, reference_box: OrientedBox) -> FloatArray:
-        """From the reference's world to the target's, shape (4, 4): 9-D where the pose is."""
-        if self.target_from_object is None:
-            return self.target_from_reference.as_matrix()
-        return self.target_from_object.as_matrix() @ np.linalg.inv(reference_box.world_from_object)
-
-    def box(self, of_reference: OrientedBox) -> OrientedBox:
-        """The reference's box on the target, stretched along its axes where the pose is 9-D."""
-        if self.target_from_object is None:
-            return of_reference.moved_by(self.target_from_reference)
-        return of_reference.stretched_by(self.target_from_object)
 
 
 def pool(found: PairMatches, pairs: Sequence[tuple[int, int]]) -> Matches:

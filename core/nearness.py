@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.descriptors import unit
+from core.views import FloatArray
 
-FloatArray = NDArray[np.floating]
 CENTRE_PRIOR = 4.0
 """Members for which the shipped mean, which is zero, counts when the memory's own moves it; as of `core.evidence.ADAPTATION_PRIOR`."""
 

@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from core.backbones.whitening import Whitening
 from core.calibration import LARGEST_RATE, Calibration, Levels, Prior
@@ -19,8 +18,8 @@ from core.enrolled import Enrolled
 from core.errors import InvalidInput
 from core.evidence import Adaptation, Comparison, Entry, sample_patches, whitened
 from core.scores import BEST, DEFAULT_SCORE, SCORES, require_score
+from core.views import FloatArray
 
-FloatArray = NDArray[np.floating]
 Outcome = Literal["known", "uncertain", "novel"]
 Verify = Callable[[str], float]
 """How well the best pose of a category's reference explains the burst (`core.verification`), 0 where there is none."""

@@ -16,8 +16,10 @@ from scipy.spatial.transform import Rotation
 from core.camera_poses import angles_about_deg
 from core.clock import StageClock
 from core.errors import NoPose
+from core.estimators.base import root_mean_square
 from core.matched_pair import MatchedPair
-from core.matches import Matches, PoseEstimate, end_points, pool, rays
+from core.matches import Matches, end_points, pool, rays
+from core.pose_estimate import PoseEstimate
 from core.sim3 import Sim3
 from core.views import FloatArray
 
@@ -102,7 +104,7 @@ def by_pnp(pair: MatchedPair, inlier_ratio: float, seed: int, clock: StageClock)
         )
     clock.lap("refine")
     away = np.linalg.norm(best.apply(sight.points) - np.linalg.inv(sight.camera_from_world)[sight.view, :3, 3], axis=1)
-    residual_m = float(np.sqrt(((sight.errors(best) * sight.tolerance * away)[inlier] ** 2).mean()))
+    residual_m = root_mean_square((sight.errors(best) * sight.tolerance * away)[inlier])
     return PoseEstimate(best, replace(matches, inlier=inlier), pair.similarity, tuple(pairs), residual_m)
 
 

@@ -1,6 +1,6 @@
 """The pose pipeline: descriptors of a reference and a burst in, a 7-D transform out; every variant is a config.
 
-Letters: M reference views, N target views, K correspondences, T transforms.
+Letters: K correspondences of a view pair.
 """
 
 from __future__ import annotations
@@ -9,49 +9,22 @@ from dataclasses import asdict, dataclass, field, replace
 from typing import Literal
 
 import numpy as np
-import torch
 
+from core.best_pose import BestConfig, axis_scales_by_agreement, by_agreement
 from core.boxes import cloud_extent_m
 from core.clock import StageClock
-from core.confidence import probabilities
 from core.correspond import METHODS
-from core.dense import DenseAgreement, DenseConfig
 from core.descriptors import component_count
 from core.encode import EncodedBurst
 from core.errors import InvalidInput, NoPose
 from core.estimators import ESTIMATORS
-from core.hypotheses import HypothesesConfig, distinct, propose
 from core.matched_pair import MatchedPair, require_comparable
-from core.matches import Alternative, PoseEstimate, pool
 from core.pnp import by_pnp
+from core.pose_estimate import PoseEstimate
 from core.reference import Reference
 from core.sim3 import Sim3
-from core.solvers import axis_scales, by_consensus, by_retrieval, by_single_view, judge, stretched
-from core.viewpoints import view_agreement
+from core.solvers import axis_scales, by_consensus, by_retrieval, by_single_view, stretched
 from core.views import FloatArray
-
-
-@dataclass(frozen=True)
-class BestConfig:
-    """What the variant `best` adds: many hypotheses, judged and refined over all points."""
-
-    hypotheses: HypothesesConfig = field(default_factory=HypothesesConfig)
-    dense: DenseConfig = field(default_factory=DenseConfig)
-    polish: DenseConfig | None = field(default_factory=lambda: DenseConfig(points=1200))
-    """For the last refinement, of the winner alone; None leaves it out."""
-    steady: bool = True
-    """Refines by what is steady from view to view (`core.discriminant`), else by principal components."""
-    view_weight: float = 0.05
-    """Weight, for each target view, of the agreement of view pairs beside the log of the dense score: every view is further evidence."""
-    most_view_weight: float = 0.5
-    view_deg: float = 40.0
-    """Angle over which a view pair speaks for a rotation."""
-    refined: int = 24
-    """Hypotheses that are refined: the best of those that differ in rotation."""
-    distinct_deg: float = 10.0
-    alternative_deg: float = 30.0
-    """An alternative differs by at least this from better ones, and from what they are after a symmetry of the reference."""
-    alternatives: int = 3
 
 
 @dataclass(frozen=True)
@@ -163,7 +136,7 @@ class PoseEstimator:
         needed = (True, config.solver != "pnp")
         pair = MatchedPair(reference, target, dims, config.correspondences, config.method, depth=needed)
         clock.lap("match")
-        threshold_m = self.config.inlier_ratio * cloud_extent_m(target.cloud_m)
+        threshold_m = config.inlier_ratio * cloud_extent_m(target.cloud_m)
         estimate = self._solve(pair, reference.symmetries, threshold_m, seed, clock)
         if config.dof == 9:
             estimate = self._stretch(estimate, pair, Sim3.from_matrix(reference.box.world_from_object), threshold_m, seed)
@@ -180,59 +153,15 @@ class PoseEstimator:
             return by_consensus(pair, config.consensus_deg, ESTIMATORS[config.estimator], threshold_m, seed, clock)
         if config.solver == "pnp":
             return by_pnp(pair, config.inlier_ratio, seed, clock)
-        return self._by_agreement(pair, symmetries, threshold_m, seed, clock)
+        return by_agreement(pair, config.best, symmetries, threshold_m, seed, clock)
 
     def _stretch(self, estimate: PoseEstimate, pair: MatchedPair, world_from_object: Sim3, threshold_m: float, seed: int) -> PoseEstimate:
         """9-D where that is determined, else 7-D as it was."""
         try:
             if self.config.solver == "agreement":
-                config = self.config.best.polish or self.config.best.dense
-                agreement = DenseAgreement(*pair.surfaces, pair.steady_descriptors, config, seed)
-                transform = agreement.stretch(estimate.target_from_reference, world_from_object)
+                transform = axis_scales_by_agreement(estimate, pair, self.config.best, world_from_object, seed)
             else:
                 transform = axis_scales(estimate, pair, world_from_object, threshold_m)
         except NoPose as error:
             return replace(estimate, not_9d_because=str(error))
         return stretched(estimate, transform, pair, world_from_object, threshold_m)
-
-    def _by_agreement(self, pair: MatchedPair, symmetries: FloatArray, threshold_m: float, seed: int, clock: StageClock) -> PoseEstimate:
-        """Ours: many hypotheses, the most promising refined, the one that lays the objects on each other best.
-
-        Of poses that are the same after a symmetry of the reference the best alone is listed: they are no rivals.
-        """
-        config = self.config.best
-        guesses = propose(pair, config.hypotheses, threshold_m, seed)
-        if not len(guesses):
-            raise NoPose("no view pair gives a hypothesis of plausible size; send more views or better depth")
-        clock.lap("propose")
-        agreement = DenseAgreement(*pair.surfaces, pair.descriptors, config.dense, seed)
-        promising = distinct(guesses, agreement.score(guesses), config.distinct_deg, config.refined)
-        clock.lap("score")
-        descriptors = pair.steady_descriptors if config.steady else pair.descriptors
-        refined = DenseAgreement(*pair.surfaces, descriptors, config.dense, seed).refine(guesses.select(promising))
-        views = view_agreement(refined.rotation.numpy(), pair.relative, pair.similarity, config.view_deg)
-        weight = min(config.view_weight * len(pair.target), config.most_view_weight)
-        scores = agreement.score(refined) * torch.from_numpy(np.exp(weight * views))
-        ranked = distinct(refined, scores, config.alternative_deg, 1 + config.alternatives, symmetries)
-        clock.lap("refine")
-        winner = refined.select(ranked[:1])
-        if config.polish is not None:
-            winner = DenseAgreement(*pair.surfaces, descriptors, config.polish, seed).refine(winner)
-        transform = winner[0]
-        clock.lap("polish")
-        pairs = pair.best_pairs()
-        matches, residual_m = judge(pool(pair.found, pairs), transform, pair, threshold_m)
-        likely = probabilities(scores[ranked].double().numpy(), len(pair.target), pair.fingerprint)
-        best, *rivals = [
-            Alternative(refined[index], float(scores[index]), confidence) for index, confidence in zip(ranked, likely, strict=True)
-        ]
-        return PoseEstimate(
-            transform,
-            matches,
-            pair.similarity,
-            tuple(pairs),
-            residual_m,
-            score=best.score,
-            confidence=best.confidence,
-            alternatives=tuple(rivals),
-        )

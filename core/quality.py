@@ -13,9 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.encode import EncodedView
-from core.views import Camera, View
+from core.views import Camera, FloatArray, View
 
-FloatArray = NDArray[np.floating]
 Fault = Literal["out_of_view", "cut_off", "blur", "little_depth", "elsewhere", "copy", "contradicted"]
 SIDE = 192
 """Pixels a side that a region is resampled to before its sharpness is judged, so that resolution does not matter."""

@@ -9,13 +9,12 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from core.boxes import OrientedBox
 from core.errors import InvalidInput
-from core.sim3 import Sim3, rotation_angle_deg
+from core.sim3 import Sim3, homogeneous, rotation_angle_deg
+from core.views import FloatArray
 
-FloatArray = NDArray[np.floating]
 Anchor = Literal["center", "base"]
 """The point that the motion takes exactly to its goal: the middle of the object, or of the face that it stands on.
 Objects of one category differ in size, so only one point can; `base` puts a smaller one on the same support."""
@@ -63,19 +62,11 @@ def rearrange(
     if anchor == "base":
         if up is None:
             raise InvalidInput("up", "is missing: the base of an object is its lowest side, so say where up is at the goal")
-        turned = OrientedBox(_turned(rotation, current), current.extent_m)
+        turned = current.moved_by(Sim3.turn_about(start, rotation))
         end = end - _half_height(goal, up) * up
         start = start - _half_height(turned, up) * (rotation.T @ up)
-    motion = np.eye(4)
-    motion[:3, :3], motion[:3, 3] = rotation, end - rotation @ start
     angle = float(rotation_angle_deg(rotation, np.eye(3)))
-    return Motion(motion, angle, float(np.linalg.norm(end - start)), chosen != 0)
-
-
-def _turned(rotation: FloatArray, box: OrientedBox) -> FloatArray:
-    turned = box.world_from_object.copy()
-    turned[:3, :3] = rotation @ turned[:3, :3]
-    return turned
+    return Motion(homogeneous(rotation, end - rotation @ start), angle, float(np.linalg.norm(end - start)), chosen != 0)
 
 
 def _half_height(box: OrientedBox, up: FloatArray) -> float:

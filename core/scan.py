@@ -10,15 +10,13 @@ from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from core.boxes import cloud_extent_m, remove_outliers
 from core.camera_poses import angles_about_deg, hemisphere, nearest_view
 from core.encode import EncodedBurst
 from core.errors import InvalidInput, NoObject
-from core.views import Camera
+from core.views import Camera, FloatArray
 
-FloatArray = NDArray[np.floating]
 UpSource = Literal["given", "cameras", "assumed"]
 DEFAULT_VIEWPOINTS = 10
 """The paper scans with 10 or 20."""

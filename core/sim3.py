@@ -8,11 +8,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from core.errors import InvalidInput, NoPose
+from core.views import FloatArray
 
-FloatArray = NDArray[np.floating]
 RANK_TOLERANCE = 1e-6
 """Second singular value over the first below which points count as collinear."""
 
@@ -37,6 +36,11 @@ class Sim3:
         return Sim3(1.0, np.eye(3), np.zeros(3))
 
     @staticmethod
+    def turn_about(center: FloatArray, rotation: FloatArray) -> Sim3:
+        """The rigid motion that turns by a rotation, shape (3, 3), about a point, shape (3,)."""
+        return Sim3(1.0, rotation, center - rotation @ center)
+
+    @staticmethod
     def from_matrix(matrix: FloatArray) -> Sim3:
         """From a 4×4 matrix [[λR, t], [0, 1]]. Raises InvalidInput where λR is no scaled rotation."""
         matrix = np.asarray(matrix, dtype=float)
@@ -51,10 +55,7 @@ class Sim3:
 
     def as_matrix(self) -> FloatArray:
         """[[λR, t], [0, 1]], shape (4, 4)."""
-        matrix = np.eye(4)
-        matrix[:3, :3] = self.scale * self.rotation
-        matrix[:3, 3] = self.translation
-        return matrix
+        return homogeneous(self.scale * self.rotation, self.translation)
 
     @property
     def quaternion(self) -> FloatArray:
@@ -73,6 +74,13 @@ class Sim3:
     def __matmul__(self, other: Sim3) -> Sim3:
         """c_from_b @ b_from_a = c_from_a."""
         return Sim3(self.scale * other.scale, self.rotation @ other.rotation, self.apply(other.translation))
+
+
+def homogeneous(linear: FloatArray, translation: FloatArray) -> FloatArray:
+    """[[linear, translation], [0, 1]], shape (4, 4), from shapes (3, 3) and (3,)."""
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = linear, translation
+    return matrix
 
 
 def _quaternion(rotation: FloatArray) -> FloatArray:

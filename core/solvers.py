@@ -12,11 +12,12 @@ import numpy as np
 from core.affine9 import Affine9, fit_affine9
 from core.clock import StageClock
 from core.errors import NoPose
-from core.estimators.base import MAX_SCALE, Estimator, refit
+from core.estimators.base import MAX_SCALE, Estimator, refit, root_mean_square
 from core.estimators.ransac import REFITS
 from core.hypotheses import align_clouds
 from core.matched_pair import MatchedPair, Pairs
-from core.matches import Matches, PoseEstimate, end_points, pool
+from core.matches import Matches, end_points, pool
+from core.pose_estimate import PoseEstimate
 from core.sim3 import Sim3
 from core.viewpoints import consensus, mean_rotation, near_their_mean
 
@@ -103,7 +104,7 @@ def stretched(estimate: PoseEstimate, transform: Affine9, pair: MatchedPair, wor
         target_from_object=transform,
         target_from_reference=transform.similarity() @ world_from_object.inverse(),
         matches=replace(estimate.matches, inlier=inlier),
-        residual_m=float(np.sqrt((errors[inlier] ** 2).mean())) if inlier.any() else 0.0,
+        residual_m=root_mean_square(errors[inlier]),
     )
 
 

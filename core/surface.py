@@ -9,12 +9,15 @@ from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
+import open3d as o3d
 from numpy.typing import NDArray
 
 from core.boxes import inliers
 from core.encode import EncodedView
-from core.normals import outward_normals
 from core.views import FloatArray
+
+NEIGHBOURS = 20
+"""Points that a plane is laid through for a normal: about a patch of 4 by 5 of the view's own."""
 
 
 class Surface:
@@ -30,8 +33,14 @@ class Surface:
 
     @cached_property
     def normals(self) -> FloatArray:
-        """Shape (N, 3), see `outward_normals`."""
-        return outward_normals(self.views)
+        """Unit vectors, towards the camera that saw each point: a surface is seen from outside only. Shape (N, 3)."""
+        points = self.points_m.astype(np.float64)
+        eyes = [view.camera.world_from_camera[:3, 3] for view in self.views if view.camera is not None]
+        towards = np.repeat(np.stack(eyes), [len(view.points_m) for view in self.views], axis=0) - points
+        cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
+        cloud.estimate_normals(o3d.geometry.KDTreeSearchParamKNN(NEIGHBOURS))
+        normals = np.asarray(cloud.normals)
+        return np.where((normals * towards).sum(axis=1, keepdims=True) < 0, -normals, normals)
 
     @cached_property
     def _inliers(self) -> NDArray[np.intp]:

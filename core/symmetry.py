@@ -119,7 +119,7 @@ class _SelfAgreement:
 
     def refine(self, turn: FloatArray, center_m: FloatArray) -> Sim3:
         """Rounds of weighted least squares on soft matches; a rigid motion of the world. Raises NoPose where they determine none."""
-        config, motion = self._config.agreement, Sim3(1.0, turn, center_m - turn @ center_m)
+        config, motion = self._config.agreement, Sim3.turn_about(center_m, turn)
         comparable = config.refine_power * self._comparable(turn)
         for sigma in config.refine_sigmas:
             placed = torch.from_numpy(motion.apply(self._points)).float()

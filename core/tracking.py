@@ -9,12 +9,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from core.sim3 import Sim3, rotation_angle_deg
-
-FloatArray = NDArray[np.floating]
+from core.views import FloatArray
 
 
 @dataclass(frozen=True)
@@ -96,7 +94,7 @@ def missed(track: Track, elapsed_s: float, config: TrackConfig) -> Track:
 
 def with_symmetries(poses: Sequence[Sim3], symmetries: FloatArray, center_m: FloatArray) -> list[Sim3]:
     """Each pose, followed by what it is with the reference turned by each symmetry, shape (S, 3, 3), about its middle, shape (3,)."""
-    turns = [Sim3(1.0, turn, center_m - turn @ center_m) for turn in np.asarray(symmetries, dtype=float).reshape(-1, 3, 3)]
+    turns = [Sim3.turn_about(center_m, turn) for turn in np.asarray(symmetries, dtype=float).reshape(-1, 3, 3)]
     return [turned for pose in poses for turned in (pose, *(pose @ turn for turn in turns))]
 
 

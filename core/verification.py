@@ -6,24 +6,20 @@ of their surface, in shape and appearance at once; two of different kinds can be
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from core.backbones.whitening import Whitening
 from core.dense import DenseAgreement, DenseConfig
 from core.descriptors import unit
-from core.encode import EncodedBurst, EncodedView
+from core.encode import EncodedBurst
 from core.estimators.batched import Sim3Batch
-from core.matches import PoseEstimate
+from core.evidence import whitened
 from core.pose import PoseConfig, PoseEstimator
+from core.pose_estimate import PoseEstimate
 from core.reference import Reference
 from core.sim3 import Sim3
 from core.surface import Surface
-from core.views import FloatArray
 
 DENSE = DenseConfig(points=700, sigma=0.1)
 """Wider than for ranking poses: objects of a kind differ in shape."""
-
-
 VERIFYING = PoseConfig.named("best")
 """The poses that verify, whatever variant an answer's pose is of: the shipped figures are of these."""
 
@@ -40,10 +36,6 @@ def agreement(reference: Reference, target: EncodedBurst, target_from_reference:
     Whitened, since the reference's own components, which serve to find the pose, tell parts of its kind apart and not kinds.
     """
     sides = [[view.trusted_only() for view in views] for views in (reference.views, target.views)]
-    described = [_describe(views, whitening) for views in sides]
+    described = [[unit(whitened(view.descriptors, whitening)) for view in views] for views in sides]
     dense = DenseAgreement(Surface(sides[0]), Surface(sides[1]), (described[0], described[1]), DENSE, seed=0)
     return float(dense.score(Sim3Batch.of([target_from_reference]))[0])
-
-
-def _describe(views: Sequence[EncodedView], whitening: Whitening | None) -> list[FloatArray]:
-    return [unit(view.descriptors if whitening is None else whitening.apply(view.descriptors)) for view in views]

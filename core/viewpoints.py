@@ -13,8 +13,8 @@ from scipy.spatial.transform import Rotation
 
 from core.encode import EncodedView
 from core.errors import InvalidInput
+from core.views import FloatArray
 
-FloatArray = NDArray[np.floating]
 ROTATION_SAMPLES = 10_000
 """Random rotations tried for a consensus: about 75 fall within 30° of any given one."""
 

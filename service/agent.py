@@ -8,10 +8,10 @@ from core.clock import StageClock
 from core.encode import EncodedBurst
 from core.errors import Conflict, InvalidInput, NoPose, NotFound, Unavailable
 from core.look import Look, look
-from core.matches import PoseEstimate
 from core.novelty import Decision, DecisionConfig
 from core.packing import burst_from_arrays
 from core.pose import PoseConfig, PoseOptions
+from core.pose_estimate import PoseEstimate
 from core.scan import DEFAULT_VIEWPOINTS, ScanOptions, ScanRequest, request_scan
 from core.scores import DEFAULT_SCORE
 from core.verification import VERIFYING

@@ -8,8 +8,8 @@ from typing import Protocol
 from core.backbones.whitening import Whitening
 from core.encode import EncodedBurst, Encoder
 from core.look import Encodes
-from core.matches import PoseEstimate
 from core.pose import PoseConfig, PoseEstimator
+from core.pose_estimate import PoseEstimate
 from core.reference import Reference
 from core.verification import verify
 from service.batching import BatchingBackbone

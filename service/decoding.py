@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from core.errors import InvalidInput
-from core.views import Burst, Camera, View
+from core.views import Burst, Camera, FloatArray, View
 from service.errors import field_path
 from service.images import decode_colour, decode_depth, decode_mask
 from service.plausibility import plausible
@@ -23,7 +23,6 @@ from service.schemas.bursts import BurstPart, matrix
 
 ABOUT_BYTES = 8192
 """Of JSON for a view; its 25 numbers take a tenth of it."""
-FloatArray = NDArray[np.floating]
 
 
 @dataclass(frozen=True)

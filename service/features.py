@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from core.encode import EncodedBurst
-from core.matches import Matches, PoseEstimate
+from core.matches import Matches
 from core.packing import burst_as_arrays
+from core.pose_estimate import PoseEstimate
 
 Array = NDArray[Any]
 MATCH = "match_"

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from core.backbones.whitening import Whitening
 from core.encode import EncodedBurst
 from core.errors import InvalidInput, NoObject, NoPose, Unavailable
-from core.matches import PoseEstimate
 from core.next_view import Candidate, next_viewpoints
 from core.novelty import Context, Decision, DecisionConfig, decide
+from core.pose_estimate import PoseEstimate
 from core.reference import Reference
 from core.scores import BEST
 from service.cancelling import require_wanted

@@ -17,10 +17,9 @@ from core.crop import Window
 from core.depth import complete
 from core.descriptors import PcaBasis
 from core.encode import EncodedView
-from core.views import Camera, View
+from core.views import Camera, FloatArray, View
 
 Picture = NDArray[np.uint8]
-FloatArray = NDArray[np.floating]
 Colour = tuple[int, int, int]
 CROP_SIDE = 448
 """Pixels a side of a picture of a close crop: 16 a patch on a grid of 28."""

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from core.affine9 import Affine9
 from core.boxes import OrientedBox
 from core.grounds import Grounds
-from core.matches import Alternative
 from core.novelty import Decision
+from core.pose_estimate import Alternative
 from core.quality import ViewFault
 from core.scan import ScanRequest
 from core.sim3 import Sim3

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from core.affine9 import Affine9
 from core.boxes import OrientedBox
 from core.grounds import Grounds
-from core.matches import Alternative, PoseEstimate
 from core.novelty import Decision, Outcome
+from core.pose_estimate import Alternative, PoseEstimate
 from core.rearrange import Anchor
 from core.reference import Reference
 from core.scan import ScanRequest

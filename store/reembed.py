@@ -12,12 +12,12 @@ from pathlib import Path
 
 from sqlite_utils import Database
 
-from core.agreement import agreeing
 from core.backbones.base import Backbone
 from core.encode import EncodedBurst, Encoder
 from core.errors import InvalidInput, OneLookError, Unavailable
 from core.packing import burst_as_arrays
 from core.reference import build_reference
+from core.view_consistency import consistent_only
 from store.arrays import Array, arrays_file, write_arrays
 from store.audit import record
 from store.bursts import read_burst
@@ -85,7 +85,7 @@ def _compute(connection: Connection, encoder: Encoder, generation: str, progress
         folder = connection.root / row["folder"]
         files = files_from_json(row["files"])
         try:
-            encoded = agreeing(encoder.encode(read_burst(folder, files)))
+            encoded = consistent_only(encoder.encode(read_burst(folder, files)))
             if table == "categories":
                 reference = build_reference(encoded)
                 written = _beside(folder, files, f"reference-{generation}.npz", reference.as_arrays())

@@ -6,7 +6,6 @@ Letters: H, W image height and width in pixels.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,9 +13,8 @@ from scipy.spatial.transform import Rotation
 
 from benchmarks.degradations.noise import smooth_noise
 from core.errors import InvalidInput
-from core.views import Camera, View
+from core.views import Camera, FloatArray, View
 
-FloatArray = NDArray[np.floating[Any]]
 NOISE_GRAIN = 1 / 160
 """Of depth noise, share of the image's width: a stereo camera matches windows, so neighbours err together, and no median takes that out."""
 BLOB_GRAIN = 1 / 40

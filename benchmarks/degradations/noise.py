@@ -5,13 +5,12 @@ Letters: H, W image height and width in pixels.
 
 from __future__ import annotations
 
-from typing import Any
-
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.floating[Any]]
+from core.views import FloatArray
+
 COARSE, FINE = 4, 24
 """Patches a side of a texture's two layers."""
 

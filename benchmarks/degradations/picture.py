@@ -6,15 +6,13 @@ Letters: H, W image height and width in pixels; K a kernel's side.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from core.views import Camera, View
+from core.views import Camera, FloatArray, View
 
-FloatArray = NDArray[np.floating[Any]]
 FULL_WELL = 10_000
 """Electrons that a pixel holds, the light that is white: those of small sensors."""
 READ_NOISE = 10

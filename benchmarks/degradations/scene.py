@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 
 from benchmarks.degradations.noise import texture
 from core.errors import InvalidInput
-from core.views import View
+from core.views import FloatArray, View
 
-FloatArray = NDArray[np.floating[Any]]
 BEFORE = 0.9
 """An occluder's depth, as a share of the object's nearest point's."""
 ASPECT = (0.5, 2.0)

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from core.errors import NoPose
 from core.sim3 import Sim3
+from core.views import FloatArray
 
-FloatArray = NDArray[np.floating]
 MIN_CORRESPONDENCES = 4
 """Points a hypothesis is fitted to (paper, "Final pose estimation")."""
 MAX_SCALE = 4.0
@@ -64,4 +64,9 @@ def no_agreement(source: FloatArray) -> NoPose:
 def refit(source: FloatArray, target: FloatArray, transform: Sim3, inlier: NDArray[np.bool_]) -> RobustFit:
     """The result for a final transform and its inlier set."""
     errors = np.linalg.norm(transform.apply(source) - target, axis=1)[inlier]
-    return RobustFit(transform, inlier, float(np.sqrt((errors**2).mean())) if errors.size else 0.0)
+    return RobustFit(transform, inlier, root_mean_square(errors))
+
+
+def root_mean_square(errors: FloatArray) -> float:
+    """Of shape (K,); 0 of none."""
+    return float(np.sqrt((errors**2).mean())) if errors.size else 0.0

@@ -31,6 +31,11 @@ class Sim3Batch:
     translation: Tensor
     """Shape (T, 3)."""
 
+    @staticmethod
+    def empty() -> Sim3Batch:
+        """None at all."""
+        return Sim3Batch(torch.zeros(0), torch.zeros(0, 3, 3), torch.zeros(0, 3))
+
     def __len__(self) -> int:
         return len(self.scale)
 

@@ -7,8 +7,9 @@ from collections.abc import Mapping
 import numpy as np
 
 from core.errors import Unavailable
-from core.estimators.base import MIN_CORRESPONDENCES, Estimator, FloatArray, RobustFit, no_agreement, refit, require_enough
+from core.estimators.base import MIN_CORRESPONDENCES, Estimator, RobustFit, no_agreement, refit, require_enough
 from core.sim3 import Sim3
+from core.views import FloatArray
 
 
 def lo_ransac(source: FloatArray, target: FloatArray, threshold_m: float, seed: int) -> RobustFit:

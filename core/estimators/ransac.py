@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from core.errors import NoPose
-from core.estimators.base import MAX_SCALE, MIN_CORRESPONDENCES, Estimator, FloatArray, RobustFit, no_agreement, refit, require_enough
+from core.estimators.base import MAX_SCALE, MIN_CORRESPONDENCES, Estimator, RobustFit, no_agreement, refit, require_enough
 from core.estimators.batched import Sim3Batch, umeyama_batch
 from core.sim3 import Sim3, umeyama
+from core.views import FloatArray
 
 TRIALS = 1000
 REFITS = 3

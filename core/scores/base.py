@@ -14,11 +14,10 @@ from dataclasses import dataclass
 from typing import Literal, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from core.descriptors import unit
+from core.views import FloatArray
 
-FloatArray = NDArray[np.floating]
 Aggregation = Literal["sum", "mean", "max"]
 
 

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from core.scores.base import FloatArray, Score
+from core.scores.base import Score
+from core.views import FloatArray
 
 
 def best_view(burst: FloatArray, target: FloatArray) -> float:

@@ -18,8 +18,8 @@ from ray.serve.schema import ReplicaState  # type: ignore[attr-defined]
 from core.backbones.whitening import Whitening
 from core.encode import EncodedBurst
 from core.errors import OneLookError, Unavailable
-from core.matches import PoseEstimate
 from core.pose import PoseConfig
+from core.pose_estimate import PoseEstimate
 from core.reference import Reference
 from core.views import Burst
 from service.cancelling import require_wanted

@@ -10,8 +10,8 @@ from core.backbones.base import Backbone
 from core.backbones.whitening import Whitening
 from core.encode import EncodedBurst, Encoder
 from core.errors import OneLookError
-from core.matches import PoseEstimate
 from core.pose import PoseConfig
+from core.pose_estimate import PoseEstimate
 from core.reference import Reference
 from core.views import Burst
 from service.app import warm_backbone

@@ -15,7 +15,6 @@ from core.encode import EncodedBurst, EncodedView
 from core.errors import NoPose
 from core.estimators.batched import Sim3Batch, umeyama_batch
 from core.hypotheses import distinct
-from core.normals import outward_normals
 from core.pose import VARIANTS, PoseEstimator
 from core.sim3 import Sim3, rotation_angle_deg
 from core.surface import Surface
@@ -113,5 +112,5 @@ def test_a_plate_face_down_does_not_lie_on_one_face_up(moved: Sim3) -> None:
 
 
 def test_normals_point_to_the_camera() -> None:
-    normals = outward_normals(plate(Sim3.identity(), 6))
+    normals = Surface(plate(Sim3.identity(), 6)).normals
     np.testing.assert_allclose(normals[:, 2], 1.0, atol=0.02)

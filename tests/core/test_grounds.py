@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.agreement import agreeing
 from core.encode import EncodedBurst
 from core.grounds import Grounds, grounds
+from core.view_consistency import consistent_only
 from core.views import Burst, View
 
 from .conftest import IMAGE, PaintedObject, before_the_object
@@ -20,7 +20,7 @@ def photographs(count: int) -> Burst:
 
 
 def grounds_of(encoded: EncodedBurst) -> Grounds:
-    return grounds(photographs(len(encoded.views)), encoded, agreeing(encoded))
+    return grounds(photographs(len(encoded.views)), encoded, consistent_only(encoded))
 
 
 def test_views_from_all_sides_are_no_weak_grounds(painted: PaintedObject) -> None:

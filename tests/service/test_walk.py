@@ -72,7 +72,7 @@ def test_a_burst_comes_through_the_rooms_in_the_order_of_the_page(backbone: Any,
 ONCE = (
     "service.agent.Agent.observe",
     "core.encode.Encoder.encode",
-    "core.agreement.agreeing",
+    "core.view_consistency.consistent_only",
     "core.novelty.decide",
     "store.observations.Observations.create",
 )

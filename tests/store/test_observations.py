@@ -12,8 +12,8 @@ from core.boxes import OrientedBox
 from core.encode import EncodedBurst
 from core.errors import Conflict, NotFound
 from core.grounds import Grounds
-from core.matches import Alternative
 from core.novelty import Decision
+from core.pose_estimate import Alternative
 from core.quality import ViewFault
 from core.reference import Reference
 from core.scan import ScanRequest

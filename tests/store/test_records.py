@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from core.affine9 import Affine9
-from core.matches import Alternative, Matches, PoseEstimate
+from core.matches import Matches
+from core.pose_estimate import Alternative, PoseEstimate
 from core.reference import Reference
 from core.sim3 import Sim3
 from core.views import Burst, View

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from core.boxes import cloud_extent_m
 from core.encode import EncodedBurst, EncodedView
+from core.views import FloatArray
 
-FloatArray = NDArray[np.floating]
 Kept = NDArray[np.bool_]
 
 LEAST_VIEWS = 3
@@ -35,7 +35,7 @@ BORDER = 3
 """Patches around a map, so that what projects beside the window has neighbours, too."""
 
 
-def agreeing(encoded: EncodedBurst) -> EncodedBurst:
+def consistent_only(encoded: EncodedBurst) -> EncodedBurst:
     """The burst with the patches of each view that the other views speak for at least as much as against; those without depth stay.
 
     A view of which nothing is left has no patches, as if no object had been found in it. `cls` and, where patches are left, `pooled` stay

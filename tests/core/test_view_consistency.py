@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.agreement import agreeing
 from core.encode import EncodedBurst, EncodedView
 from core.reference import build_reference
 from core.scan import request_scan
 from core.sim3 import Sim3
+from core.view_consistency import consistent_only
 
 from .conftest import PaintedObject, before_the_object, blind
 
@@ -30,7 +30,7 @@ def with_table(encoded: EncodedBurst, index: int) -> EncodedBurst:
 
 def test_of_a_view_of_the_table_what_lies_within_the_object_is_left_at_most(painted: PaintedObject) -> None:
     encoded = with_table(painted.encode(8), 2)
-    kept = agreeing(encoded)
+    kept = consistent_only(encoded)
     assert len(kept.views[2].cells) < 0.2 * len(encoded.views[2].cells)
     assert all(left is before for index, (left, before) in enumerate(zip(kept.views, encoded.views)) if index != 2)
     np.testing.assert_allclose(build_reference(kept).box.extent_m, painted.reference(8).box.extent_m, rtol=0.1)
@@ -42,24 +42,24 @@ def test_of_a_view_that_shows_a_wall_too_the_object_stays(painted: PaintedObject
     walled = view.points_m.copy()
     walled[: len(walled) // 4] += (0.0, 3.0, 0.0)
     views = (*encoded.views[:3], replace(view, points_m=walled), *encoded.views[4:])
-    kept = agreeing(replace(encoded, views=views)).views[3]
+    kept = consistent_only(replace(encoded, views=views)).views[3]
     np.testing.assert_array_equal(kept.points_m, view.points_m[len(walled) // 4 :])
     np.testing.assert_array_equal(kept.descriptors, view.descriptors[len(walled) // 4 :])
 
 
 def test_all_sides_of_an_object_stay(painted: PaintedObject, moved: Sim3) -> None:
     encoded = painted.encode(12, moved)
-    assert all(kept is view for kept, view in zip(agreeing(encoded).views, encoded.views))
+    assert all(kept is view for kept, view in zip(consistent_only(encoded).views, encoded.views))
 
 
 def test_of_two_views_that_differ_both_stay(painted: PaintedObject) -> None:
     encoded = with_table(painted.encode(2), 0)
-    assert agreeing(encoded) is encoded
+    assert consistent_only(encoded) is encoded
 
 
 def test_views_without_depth_say_nothing(painted: PaintedObject) -> None:
     photographed = blind(painted.encode(6))
-    assert agreeing(photographed) is photographed
+    assert consistent_only(photographed) is photographed
 
 
 def test_a_scan_is_asked_for_about_the_object_though_some_patches_are_of_the_wall(painted: PaintedObject) -> None:
@@ -75,7 +75,7 @@ def test_what_is_before_the_object_in_one_view_goes(painted: PaintedObject) -> N
     encoded = painted.encode(8)
     view = encoded.views[3]
     found = replace(encoded, views=(*encoded.views[:3], before_the_object(view, 0.6), *encoded.views[4:]))
-    kept = agreeing(found).views
+    kept = consistent_only(found).views
     np.testing.assert_array_equal(kept[3].points_m, view.points_m[int(0.6 * len(view.cells)) :])
     assert all(left is before for index, (left, before) in enumerate(zip(kept, encoded.views)) if index != 3)
 
@@ -85,7 +85,7 @@ def test_patches_without_depth_are_not_judged(painted: PaintedObject) -> None:
     points = encoded.views[3].points_m.copy()
     points[::2] = np.nan
     views = (*encoded.views[:3], replace(encoded.views[3], points_m=points), *encoded.views[4:])
-    assert agreeing(replace(encoded, views=views)).views[3] is views[3]
+    assert consistent_only(replace(encoded, views=views)).views[3] is views[3]
 
 
 def test_cameras_that_are_all_wrong_take_nothing_out(painted: PaintedObject) -> None:
@@ -98,4 +98,4 @@ def test_cameras_that_are_all_wrong_take_nothing_out(painted: PaintedObject) -> 
         return replace(view, camera=replace(view.camera, world_from_camera=pose), points_m=view.points_m + np.float32(10.0 * index))
 
     astray = replace(encoded, views=tuple(moved(view, index) for index, view in enumerate(encoded.views)))
-    assert all(kept is view for kept, view in zip(agreeing(astray).views, astray.views))
+    assert all(kept is view for kept, view in zip(consistent_only(astray).views, astray.views))
