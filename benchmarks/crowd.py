@@ -14,7 +14,7 @@ import numpy as np
 from clients.asynchronous import AsyncRobotClient
 from clients.errors import ClientError, ServiceProblem
 from clients.exchange import Retry
-from clients.figures import figures
+from clients.metrics import metrics
 from core.errors import InvalidInput
 
 ONCE = Retry(attempts=1)
@@ -114,7 +114,7 @@ async def _robot(url: str, errand: Errand, rng: np.random.Generator, record: Rec
 async def _watch(url: str, record: Record, start: float, every_s: float, over: asyncio.Event, tell: Callable[[Record], None]) -> None:
     async with AsyncRobotClient(url) as observer:
         while not over.is_set():
-            found = await observer.send(figures())
+            found = await observer.send(metrics())
             resident_mb = found["process_resident_memory_bytes"] / MEGABYTE
             now = time.perf_counter() - start
             queue = found["onelook_work_running"], found["onelook_work_waiting"]

@@ -20,7 +20,9 @@ from typing import Any, Concatenate, ParamSpec, TypeVar
 import httpx
 from websockets.asyncio.client import connect
 
-from clients.answers import Category, Observation, ScanRequest, Viewpoints
+from clients.answers.categories import Category
+from clients.answers.observations import Observation
+from clients.answers.scans import ScanRequest, Viewpoints
 from clients.calls import curating, observing, operating, rearranging, scanning
 from clients.calls.call import Call
 from clients.events import PATH as EVENTS

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from clients.answers import Pose
+from clients.answers.observations import Pose
 from core.views import Camera
 
 HEADER = "scene_id,im_id,obj_id,score,R,t,time"

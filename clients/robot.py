@@ -23,8 +23,9 @@ from typing import Any, Concatenate, ParamSpec, TypeVar
 import httpx
 from websockets.sync.client import connect
 
-from clients import answers
-from clients.answers import Category, ScanRequest, Viewpoints
+from clients.answers.categories import Category
+from clients.answers.observations import Observation as Answered
+from clients.answers.scans import ScanRequest, Viewpoints
 from clients.calls import curating, observing, operating, rearranging, scanning
 from clients.calls.call import Call
 from clients.events import PATH as EVENTS
@@ -72,11 +73,11 @@ def _scans(robot: RobotClient, requests: list[ScanRequest]) -> list[Scan]:
     return [Scan(robot, each) for each in requests]
 
 
-def _observation(robot: RobotClient, seen: answers.Observation[ScanRequest]) -> Observation:
+def _observation(robot: RobotClient, seen: Answered[ScanRequest]) -> Observation:
     return seen.with_scan(lambda request: Scan(robot, request))
 
 
-def _observations(robot: RobotClient, seen: list[answers.Observation[ScanRequest]]) -> list[Observation]:
+def _observations(robot: RobotClient, seen: list[Answered[ScanRequest]]) -> list[Observation]:
     return [_observation(robot, each) for each in seen]
 
 
@@ -104,7 +105,7 @@ class Scan(Viewpoints):
         return self._robot.send(scanning.complete_scan(self.id, name))
 
 
-Observation = answers.Observation[Scan]
+Observation = Answered[Scan]
 """What the service says of one burst, with a scan that can be carried out."""
 
 

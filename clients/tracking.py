@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from clients.answers import Outcome, sim3_from_json
+from clients.answers.observations import Outcome, sim3_from_json
 from clients.calls.call import given
 from clients.errors import problem_from_json
 from clients.multipart import DEPTH_UNIT_M, encode_colour, encode_depth, encode_mask

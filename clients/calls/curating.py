@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from clients.answers import Category
+from clients.answers.categories import Category, Instance, Similarities
 from clients.calls.call import Call, nothing, reading, reading_list
-from clients.instances import Instance, Similarities
 
 
 def categories() -> Call[list[Category]]:

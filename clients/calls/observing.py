@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
-from clients.answers import Observation, Outcome, ScanRequest
+from clients.answers.observations import Observation, Outcome
+from clients.answers.scans import ScanRequest
 from clients.calls.call import Call, Direction, burst_body, given, reading, reading_list
 from core.views import Burst
 

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from clients.answers import Info
+from clients.answers.memory import Backup, Import, Info, MemoryInfo, Thresholds
 from clients.calls.call import Call, given, reading
-from clients.upkeep import Backup, Import, MemoryInfo, Thresholds
 
 
 def info() -> Call[Info]:

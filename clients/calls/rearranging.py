@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from clients.answers.goals import Anchor, Goal, Plan
 from clients.calls.call import Call, Direction, burst_or_id, given, nothing, reading, reading_list
-from clients.goals import Anchor, Goal, Plan
 from core.views import Burst
 
 

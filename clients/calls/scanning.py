@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from clients.answers import Category, ScanRequest
+from clients.answers.categories import Category
+from clients.answers.scans import ScanRequest
 from clients.calls.call import Call, Direction, burst_body, burst_or_id, given, nothing, reading, reading_list
 from core.views import Burst
 

@@ -8,7 +8,7 @@ from typing import Annotated, Protocol, TypeVar
 
 import typer
 
-from clients.answers import Category
+from clients.answers.categories import Category
 from clients.cli.terminal import URL, Json, Url, console, print_json, print_table, when
 from clients.errors import ClientError
 from clients.robot import RobotClient

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 
 from clients.datasets import folders
@@ -134,18 +135,11 @@ def _symmetries(model: Mapping[str, Any], field: str) -> tuple[FloatArray, ...]:
     """Rotations, each (3, 3), of `symmetries_discrete`, and of `symmetries_continuous` in steps of 360° / TURNS."""
     discrete = tuple(folders.read_symmetry(matrix, f"{field}.symmetries_discrete") for matrix in model.get("symmetries_discrete", ()))
     turned = tuple(
-        _rotation(np.array(symmetry["axis"], dtype=float), angle)
-        for symmetry in model.get("symmetries_continuous", ())
+        np.asarray(cv2.Rodrigues(angle * axis / np.linalg.norm(axis))[0])
+        for axis in (np.array(symmetry["axis"], dtype=float) for symmetry in model.get("symmetries_continuous", ()))
         for angle in np.arange(1, TURNS) * (2 * np.pi / TURNS)
     )
     return discrete + turned
-
-
-def _rotation(axis: FloatArray, angle: float) -> FloatArray:
-    """By `angle` radians about `axis` (Rodrigues), shape (3, 3)."""
-    x, y, z = axis / np.linalg.norm(axis)
-    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.asarray(np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross)
 
 
 def _models(root: Path) -> dict[str, Any]:

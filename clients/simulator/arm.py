@@ -69,7 +69,6 @@ class Arm:
         self.config = config or ArmConfig()
         self.clock_s = 0.0
         """Simulated time spent moving."""
-        self.moves = 0
         self.refused = 0
         """Viewpoints that were out of reach, and for which there was no other."""
         self.offsets_deg: list[float] = []
@@ -116,7 +115,6 @@ class Arm:
     def look(self, world_from_camera: FloatArray) -> View:
         """Goes to a pose that can be reached, and takes a picture."""
         self.clock_s += self._travel_s(world_from_camera) + self.config.settle_s
-        self.moves += 1
         self._at = world_from_camera
         return self.world.capture(world_from_camera)
 

@@ -11,7 +11,7 @@ import time
 from collections.abc import Iterator, Sequence, Set
 from dataclasses import dataclass, field
 
-from clients.answers import Category
+from clients.answers.categories import Category
 from clients.errors import ClientError, NoObjectProblem
 from clients.pose_error import PoseError, pose_error
 from clients.robot import Observation, RobotClient

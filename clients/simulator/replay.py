@@ -10,7 +10,7 @@ from clients.datasets.folders import Sequence, load_burst
 from clients.datasets.viewpoints import aim_point, spread
 from clients.simulator.world import WorldObject
 from core.camera_poses import nearest_view
-from core.views import Burst, FloatArray, View
+from core.views import FloatArray, View
 
 
 class ReplayWorld:
@@ -51,10 +51,6 @@ class ReplayWorld:
         self._unused.discard(candidates[position])
         self.offsets_deg.append(angle_deg)
         return self._recorded.views[candidates[position]]
-
-    def glance(self, count: int | None = None, first: int = 0) -> Burst:
-        """`count` recorded views (all where left out) spread around the object, without using them up."""
-        return self._recorded.select(spread(self._recorded.cameras, count or len(self._recorded), first % len(self._recorded)))
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,8 @@ from pathlib import Path
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from clients.answers import Category, Info
+from clients.answers.categories import Category
+from clients.answers.memory import Info
 from clients.simulator import charts
 from clients.simulator.encounter import Encounter, Verdict
 from clients.simulator.live import similarity, stage_ms, summary_rows

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass, field
 
-from clients.answers import Category
+from clients.answers.categories import Category
 from clients.errors import ClientError, InvalidInputProblem, ServiceProblem, TooFewViewsProblem
 from clients.robot import RobotClient, Scan
 from clients.simulator.arm import Arm
@@ -19,6 +19,10 @@ MOST_AGAIN = 3
 
 class ScanFailed(ClientError):
     """A scan that made no category; says why, viewpoint by viewpoint."""
+
+
+COULD_NOT = (ServiceProblem, ScanFailed)
+"""What costs a robot one object, and lets it go on to the next."""
 
 
 @dataclass
@@ -80,7 +84,3 @@ def _replace_unreachable(arm: Arm, scan: Scan, center_m: FloatArray, report: Sca
 def learn_from_scan(robot: RobotClient, arm: Arm, views: int, seed: int, name: str | None = None) -> Category:
     """A glance, a scan of what is there, and the category that it makes, whatever would be decided. Raises ServiceProblem, ScanFailed."""
     return carry_out(arm, robot.scan(arm.glance(views, seed)), name)
-
-
-COULD_NOT = (ServiceProblem, ScanFailed)
-"""What costs a robot one object, and lets it go on to the next."""

@@ -41,8 +41,6 @@ class Summary:
     """Categories in the memory at the end."""
     met_again: int
     """Objects whose category was in the memory."""
-    first_met: int
-    """Objects whose category was not."""
     correct_known: int
     false_novel: int
     false_known: int
@@ -90,7 +88,6 @@ def summarise(encounters: Sequence[Encounter], total_s: float) -> Summary:
         kinds=len({each.category for each in encounters}),
         categories=sum(each.learnt is not None for each in encounters),
         met_again=sum(each.in_memory for each in encounters),
-        first_met=sum(not each.in_memory for each in encounters),
         correct_known=count[Verdict.RECOGNISED],
         false_novel=count[Verdict.FALSE_NOVEL],
         false_known=count[Verdict.FALSE_KNOWN],

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from clients.answers import Category
+from clients.answers.categories import Category
 from clients.datasets.folders import Sequence, find_sequences, load_burst
 from clients.robot import RobotClient
 from clients.simulator.episode import Conduct, Episode, shuffled

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from clients.answers import Pose
+from clients.answers.observations import Pose
 from clients.bop_results import HEADER, bop_lines, number_of
 from core.sim3 import Sim3
 from core.views import Camera

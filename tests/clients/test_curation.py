@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from clients import errors
-from clients.answers import Category
+from clients.answers.categories import Category
 from clients.robot import RobotClient
 from core.views import Burst
 

@@ -71,7 +71,8 @@ def test_each_view_is_brought_once_before_any_again(recordings: list[Sequence]) 
     assert world.offsets_deg[-1] == pytest.approx(0, abs=1e-3)
 
 
-def test_a_glance_is_spread(recordings: list[Sequence]) -> None:
-    world = ReplayWorld(recordings[0])
-    assert len(world.glance(4)) == 4
-    assert len(world.glance()) == len(load_burst(recordings[0]))
+def test_a_robot_looks_first_from_as_many_recorded_poses_as_it_wants(recordings: list[Sequence]) -> None:
+    recorded = {camera.world_from_camera.tobytes() for camera in load_burst(recordings[0]).cameras}
+    looked_from = {pose.tobytes() for pose in ReplayWorld(recordings[0]).viewpoints(4, seed=0)}
+    assert len(looked_from) == 4
+    assert looked_from < recorded

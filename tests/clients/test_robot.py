@@ -41,7 +41,7 @@ def test_a_novel_object_is_scanned_learnt_and_recognised(robot: RobotClient, rec
 
 def test_a_scan_asks_for_camera_poses_that_a_world_answers(robot: RobotClient, recordings: list[Sequence]) -> None:
     world = ReplayWorld(recordings[0])
-    scan = robot.scan(world.glance(3))
+    scan = robot.scan(load_burst(recordings[0], range(3)))
     for viewpoint in scan:
         scan.add(world.capture(viewpoint))
     category = scan.complete()

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from clients.answers import Category, ScanRequest
+from clients.answers.categories import Category
+from clients.answers.scans import ScanRequest
 from clients.errors import InvalidInputProblem, TooFewViewsProblem
 from clients.robot import Scan
 from clients.simulator.arm import UP, Arm, ArmConfig, Limits

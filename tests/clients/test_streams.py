@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from clients import errors
-from clients.answers import Category
+from clients.answers.categories import Category
 from clients.asynchronous import AsyncRobotClient
 from clients.events import Event, EventReader
 from clients.robot import RobotClient

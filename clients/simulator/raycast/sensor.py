@@ -52,22 +52,6 @@ class SensorConfig:
         return np.array([[self.focal_px, 0, (width - 1) / 2], [0, self.focal_px, (height - 1) / 2], [0, 0, 1.0]])
 
 
-IDEAL = SensorConfig(
-    blur_px=0,
-    noise=0,
-    disparity_noise_px=0,
-    disparity_step_px=0,
-    speckle=0,
-    edge_loss=0,
-    grazing=0,
-    hand_eye_deg=0,
-    hand_eye_m=0,
-    jitter_deg=0,
-    jitter_m=0,
-)
-"""A camera without faults, but for what its second eye does not see."""
-
-
 class Sensor:
     """One camera: its calibration error is its own."""
 

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from clients.simulator.raycast.mesh import Mesh
 from clients.simulator.raycast.model import Model
-from clients.simulator.raycast.sensor import IDEAL, SensorConfig
+from clients.simulator.raycast.sensor import SensorConfig
 from clients.simulator.raycast.shapes import box
 
 BOX_M = np.array([0.2, 0.12, 0.1])
@@ -17,8 +15,22 @@ BOX_M = np.array([0.2, 0.12, 0.1])
 
 @pytest.fixture(scope="session")
 def small() -> SensorConfig:
-    """A quarter of the pixels, no faults."""
-    return replace(IDEAL, size=(120, 160), focal_px=145.0)
+    """A quarter of the pixels, and no faults but for what its second eye does not see."""
+    return SensorConfig(
+        size=(120, 160),
+        focal_px=145.0,
+        blur_px=0,
+        noise=0,
+        disparity_noise_px=0,
+        disparity_step_px=0,
+        speckle=0,
+        edge_loss=0,
+        grazing=0,
+        hand_eye_deg=0,
+        hand_eye_m=0,
+        jitter_deg=0,
+        jitter_m=0,
+    )
 
 
 @pytest.fixture(scope="session")

@@ -1,4 +1,4 @@
-"""What the service answers of its memory as a whole."""
+"""The service itself, and its memory as a whole."""
 
 from __future__ import annotations
 
@@ -6,7 +6,28 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any
 
-from clients.answers import Category
+from clients.answers.categories import Category
+
+
+@dataclass(frozen=True)
+class Info:
+    """What the service says of itself and its memory."""
+
+    version: str
+    backbone: str
+    fingerprint: str
+    score: str
+    threshold: float | None
+    """None where the score, or the rate, decides."""
+    false_known_rate: float
+    variant: str
+    categories: int
+    memory_version: int
+
+    @staticmethod
+    def from_json(answer: Mapping[str, Any]) -> Info:
+        """From the service's answer."""
+        return Info(**{each.name: answer[each.name] for each in fields(Info)})
 
 
 @dataclass(frozen=True)

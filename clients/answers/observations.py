@@ -1,17 +1,18 @@
-"""What the service answers, as numpy and plain types.
+"""Observations, and the pose of what was seen.
 
-Letters: n requested viewpoints, C categories, S symmetries.
+Letters: n viewpoints, S symmetries.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Generic, Literal, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from clients.answers.categories import CategorySimilarity
+from clients.answers.scans import ScanRequest
 from core.sim3 import Sim3
 from core.views import FloatArray
 
@@ -98,122 +99,6 @@ class Pose:
             tuple(Alternative.from_json(each) for each in fields["alternatives"]),
             np.array(fields["symmetries"], dtype=float).reshape(-1, 4),
         )
-
-
-@dataclass(frozen=True)
-class CategorySimilarity:
-    """How similar a burst is to one category; larger is more similar."""
-
-    category_id: str
-    name: str | None
-    similarity: float
-
-    @staticmethod
-    def from_json(fields: Mapping[str, Any]) -> CategorySimilarity:
-        """From the service's answer."""
-        return CategorySimilarity(fields["category_id"], fields["name"], fields["similarity"])
-
-
-@dataclass(frozen=True, eq=False)
-class ScanRequest:
-    """The views to take of a novel object, in the world frame of its burst."""
-
-    id: str
-    center_m: FloatArray
-    """Centre of the object, shape (3,), metres."""
-    up: FloatArray
-    """Unit vector the hemisphere of viewpoints opens along, shape (3,)."""
-    radius_m: float
-    world_from_camera: FloatArray
-    """Camera poses, shape (n, 4, 4), metres, OpenCV axes; near ones will do."""
-    extent_m: float
-    """The object's diameter as far as it was seen."""
-    covered: NDArray[np.bool_]
-    """Of each viewpoint whether a view was taken near it, shape (n,)."""
-    views: int
-    """Views received so far; of a completed scan 0."""
-    faults: tuple[tuple[str, ...], ...]
-    """Of each of them what is wrong with it, in words."""
-    views_required: int
-    """Fewest views that make a category."""
-
-    @staticmethod
-    def from_json(fields: Mapping[str, Any]) -> ScanRequest:
-        """From the service's answer."""
-        return ScanRequest(
-            fields["id"],
-            np.array(fields["center_m"]),
-            np.array(fields["up"]),
-            fields["radius_m"],
-            np.array(fields["world_from_camera"]),
-            fields["extent_m"],
-            np.array(fields["covered"], dtype=bool),
-            fields["views"],
-            tuple(tuple(fault["detail"] for fault in view["faults"]) for view in fields["received"]),
-            fields["views_required"],
-        )
-
-
-class Viewpoints:
-    """The viewpoints of a scan, to iterate over."""
-
-    def __init__(self, request: ScanRequest) -> None:
-        self.request = request
-
-    @property
-    def id(self) -> str:
-        """Names it in /v1/scans/{id}."""
-        return self.request.id
-
-    def __iter__(self) -> Iterator[FloatArray]:
-        """The requested camera poses, each `world_from_camera` of shape (4, 4)."""
-        return iter(self.request.world_from_camera)
-
-    def __len__(self) -> int:
-        return len(self.request.world_from_camera)
-
-
-@dataclass(frozen=True)
-class Category:
-    """A category of objects, learnt from one."""
-
-    id: str
-    name: str | None
-    created_at: str
-    """ISO 8601, UTC."""
-    views: int
-    """Views of the reference object."""
-    instances: int
-    """Bursts assigned to it, the reference's own included."""
-    extent_m: tuple[float, ...]
-    """Edge lengths of the reference's box, metres."""
-
-    @staticmethod
-    def from_json(fields: Mapping[str, Any]) -> Category:
-        """From the service's answer."""
-        extent_m = tuple(fields["extent_m"])
-        return Category(fields["id"], fields["name"], fields["created_at"], fields["views"], fields["instances"], extent_m)
-
-
-@dataclass(frozen=True)
-class Info:
-    """What the service says of itself and its memory."""
-
-    version: str
-    backbone: str
-    fingerprint: str
-    score: str
-    threshold: float | None
-    """None where the score, or the rate, decides."""
-    false_known_rate: float
-    variant: str
-    categories: int
-    memory_version: int
-
-    @staticmethod
-    def from_json(fields: Mapping[str, Any]) -> Info:
-        """From the service's answer."""
-        return Info(**{name: fields[name] for name in Info.__dataclass_fields__})
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""What the service answers of the bursts in a category, as numpy and plain types."""
+"""Categories, the bursts in them, and how similar they are."""
 
 from __future__ import annotations
 
@@ -8,8 +8,43 @@ from typing import Any, Literal
 
 import numpy as np
 
-from clients.answers import CategorySimilarity
 from core.views import FloatArray
+
+
+@dataclass(frozen=True)
+class Category:
+    """A category of objects, learnt from one."""
+
+    id: str
+    name: str | None
+    created_at: str
+    """ISO 8601, UTC."""
+    views: int
+    """Views of the reference object."""
+    instances: int
+    """Bursts assigned to it, the reference's own included."""
+    extent_m: tuple[float, ...]
+    """Edge lengths of the reference's box, metres."""
+
+    @staticmethod
+    def from_json(fields: Mapping[str, Any]) -> Category:
+        """From the service's answer."""
+        extent_m = tuple(fields["extent_m"])
+        return Category(fields["id"], fields["name"], fields["created_at"], fields["views"], fields["instances"], extent_m)
+
+
+@dataclass(frozen=True)
+class CategorySimilarity:
+    """How similar a burst is to one category; larger is more similar."""
+
+    category_id: str
+    name: str | None
+    similarity: float
+
+    @staticmethod
+    def from_json(fields: Mapping[str, Any]) -> CategorySimilarity:
+        """From the service's answer."""
+        return CategorySimilarity(fields["category_id"], fields["name"], fields["similarity"])
 
 
 @dataclass(frozen=True)

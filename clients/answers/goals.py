@@ -1,4 +1,4 @@
-"""What the service answers of goals and plans, as numpy and plain types."""
+"""Goals and plans."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from clients.answers import sim3_from_json
+from clients.answers.observations import sim3_from_json
 from core.sim3 import Sim3
 from core.views import FloatArray
 

@@ -10,7 +10,7 @@ from prometheus_client.parser import text_string_to_metric_families
 from clients.calls.call import Call
 
 
-def figures() -> Call[dict[str, float]]:
+def metrics() -> Call[dict[str, float]]:
     """Each sample's value, such as `onelook_work_waiting`, summed over its labels."""
     return Call("GET", "/metrics", _read)
 
