@@ -20,7 +20,7 @@ from core.matched_pair import MatchedPair
 from core.matches import pool
 from core.pose_estimate import Alternative, PoseEstimate
 from core.sim3 import Sim3
-from core.solvers import judge
+from core.solvers import mark_inliers
 from core.viewpoints import view_agreement
 from core.views import FloatArray
 
@@ -75,7 +75,7 @@ def by_agreement(
     transform = winner[0]
     clock.lap("polish")
     pairs = pair.best_pairs()
-    matches, residual_m = judge(pool(pair.found, pairs), transform, pair, threshold_m)
+    matches, residual_m = mark_inliers(pool(pair.found, pairs), transform, pair, threshold_m)
     likely = probabilities(scores[ranked].double().numpy(), len(pair.target), pair.fingerprint)
     best, *rivals = [
         Alternative(refined[index], float(scores[index]), confidence) for index, confidence in zip(ranked, likely, strict=True)

@@ -20,6 +20,9 @@ from core.views import Camera, FloatArray
 BOX_EDGES = tuple((a, a | 1 << axis) for a in range(8) for axis in range(3) if not a & 1 << axis)
 """Pairs of corner indices that make the twelve edges."""
 MIN_POINTS = 8
+"""Of a cloud that a support or a box is looked for in."""
+EXTENT_PERCENTILE = 98
+"""Of the distances to the middle: the farthest points are often stray."""
 NEIGHBOURS = 10
 OUTLIER_DEVIATIONS = 2.0
 """A point whose mean distance to its neighbours is this many standard deviations above the cloud's mean is an outlier.
@@ -107,7 +110,7 @@ def _spread(points: FloatArray, normal: FloatArray) -> float:
 
 
 def remove_outliers(points: FloatArray) -> FloatArray:
-    """Points, shape (N, 3), without those far from their ten nearest neighbours."""
+    """Points, shape (N, 3), without those far from their NEIGHBOURS nearest."""
     return points[inliers(points)]
 
 
@@ -143,10 +146,10 @@ def oriented_box(points: FloatArray) -> OrientedBox:
 
 
 def cloud_extent_m(points: FloatArray) -> float:
-    """A cloud's diameter, metres: twice the 98th percentile of the distance to the median point; robust to stray points."""
+    """A cloud's diameter, metres: twice the EXTENT_PERCENTILE of the distance to the median point; robust to stray points."""
     if not len(points):
         return 0.0
-    return float(2 * np.percentile(np.linalg.norm(points - np.median(points, axis=0), axis=1), 98))
+    return float(2 * np.percentile(np.linalg.norm(points - np.median(points, axis=0), axis=1), EXTENT_PERCENTILE))
 
 
 def _cloud(points: FloatArray) -> o3d.geometry.PointCloud:

@@ -97,8 +97,7 @@ class PoseOptions:
 
 
 FITTING_SOLVERS = ("single view", "umeyama")
-
-
+"""Those that fit a transform to correspondences, by an estimator."""
 _UCD = PoseConfig()
 VARIANTS = {
     "best": replace(_UCD, variant="best", consensus_deg=None, solver="agreement"),

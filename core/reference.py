@@ -18,6 +18,7 @@ from core.encode import EncodedBurst, EncodedView
 from core.errors import TooFewViews
 from core.packing import burst_as_arrays, burst_from_arrays
 from core.symmetry import find_symmetries
+from core.views import FloatArray
 
 MIN_VIEWS = 2
 """One view shows one side only; no transform to the other sides could be found."""
@@ -32,7 +33,7 @@ class Reference:
     cloud_m: NDArray[np.float32]
     """Object points without support and outliers, shape (N, 3)."""
     box: OrientedBox
-    symmetries: NDArray[np.floating]
+    symmetries: FloatArray
     """Rotations about the box's centre that map the object onto itself, identity left out, shape (S, 3, 3); see `core.symmetry`."""
     fingerprint: str
     """The backbone's."""

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from core.errors import InvalidInput, NoPose
-from core.views import FloatArray
+from core.views import ROTATION_TOLERANCE, FloatArray
 
 RANK_TOLERANCE = 1e-6
 """Second singular value over the first below which points count as collinear."""
@@ -49,7 +49,7 @@ class Sim3:
         if determinant <= 0:
             raise InvalidInput("matrix", f"determinant is {determinant:.2g}; a similarity has a positive one")
         scale = determinant ** (1 / 3)
-        if np.abs(linear.T @ linear / scale**2 - np.eye(3)).max() > 1e-3:
+        if np.abs(linear.T @ linear / scale**2 - np.eye(3)).max() > ROTATION_TOLERANCE:
             raise InvalidInput("matrix", "its 3×3 block is not a rotation times one scale")
         return Sim3(scale, linear / scale, matrix[:3, 3])
 

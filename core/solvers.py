@@ -12,7 +12,7 @@ import numpy as np
 from core.affine9 import Affine9, fit_affine9
 from core.clock import StageClock
 from core.errors import NoPose
-from core.estimators.base import MAX_SCALE, Estimator, refit, root_mean_square
+from core.estimators.base import MAX_SCALE, Estimator, errors_m, root_mean_square
 from core.estimators.ransac import REFITS
 from core.hypotheses import align_clouds
 from core.matched_pair import MatchedPair, Pairs
@@ -35,7 +35,7 @@ def by_retrieval(pair: MatchedPair, consensus_deg: float | None, threshold_m: fl
         agree = near_their_mean(rotations, consensus_deg)
         pairs, rotations = [each for each, kept in zip(pairs, agree) if kept], rotations[agree]
     transform = align_clouds(mean_rotation(rotations)[None], *pair.surfaces)[0]
-    matches, residual_m = judge(pool(pair.found, pairs), transform, pair, threshold_m)
+    matches, residual_m = mark_inliers(pool(pair.found, pairs), transform, pair, threshold_m)
     clock.lap("views")
     return PoseEstimate(transform, matches, pair.similarity, tuple(pairs), residual_m)
 
@@ -80,7 +80,7 @@ def axis_scales(estimate: PoseEstimate, pair: MatchedPair, world_from_object: Si
     inlier = estimate.matches.inlier
     transform = _bounded(fit_affine9(source[inlier], aim[inlier]))
     for _ in range(REFITS - 1):
-        again = np.linalg.norm(transform.apply(source) - aim, axis=1) < threshold_m
+        again = errors_m(transform, source, aim) < threshold_m
         if again.sum() < inlier.sum():
             break
         inlier = again
@@ -97,7 +97,7 @@ def _bounded(transform: Affine9) -> Affine9:
 def stretched(estimate: PoseEstimate, transform: Affine9, pair: MatchedPair, world_from_object: Sim3, threshold_m: float) -> PoseEstimate:
     """The estimate with a 9-D transform, a target_from_object, in place of its 7-D one."""
     source, aim = end_points(estimate.matches, pair.reference, pair.target)
-    errors = np.linalg.norm(transform.apply(world_from_object.inverse().apply(source)) - aim, axis=1)
+    errors = errors_m(transform, world_from_object.inverse().apply(source), aim)
     inlier = errors < threshold_m
     return replace(
         estimate,
@@ -108,8 +108,9 @@ def stretched(estimate: PoseEstimate, transform: Affine9, pair: MatchedPair, wor
     )
 
 
-def judge(matches: Matches, transform: Sim3, pair: MatchedPair, threshold_m: float) -> tuple[Matches, float]:
-    """Correspondences marked as inliers of a transform, and the inliers' residual."""
+def mark_inliers(matches: Matches, transform: Sim3, pair: MatchedPair, threshold_m: float) -> tuple[Matches, float]:
+    """Correspondences marked as inliers of a transform or not, and the inliers' residual."""
     source, aim = end_points(matches, pair.reference, pair.target)
-    inlier = np.linalg.norm(transform.apply(source) - aim, axis=1) < threshold_m
-    return replace(matches, inlier=inlier), refit(source, aim, transform, inlier).residual_m
+    errors = errors_m(transform, source, aim)
+    inlier = errors < threshold_m
+    return replace(matches, inlier=inlier), root_mean_square(errors[inlier])

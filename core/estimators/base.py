@@ -15,6 +15,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from core.affine9 import Affine9
 from core.errors import NoPose
 from core.sim3 import Sim3
 from core.views import FloatArray
@@ -34,6 +35,11 @@ class RobustFit:
     """Shape (K,)."""
     residual_m: float
     """Root mean square distance over the inliers, metres of the target."""
+
+    @staticmethod
+    def of(source: FloatArray, target: FloatArray, transform: Sim3, inlier: NDArray[np.bool_]) -> RobustFit:
+        """The result for a final transform and its inlier set, of shape (K,)."""
+        return RobustFit(transform, inlier, root_mean_square(errors_m(transform, source, target)[inlier]))
 
 
 class Estimator(Protocol):
@@ -61,10 +67,9 @@ def no_agreement(source: FloatArray) -> NoPose:
     return NoPose(f"no {MIN_CORRESPONDENCES} of {len(source)} correspondences agree on a transform; are these objects of one kind?")
 
 
-def refit(source: FloatArray, target: FloatArray, transform: Sim3, inlier: NDArray[np.bool_]) -> RobustFit:
-    """The result for a final transform and its inlier set."""
-    errors = np.linalg.norm(transform.apply(source) - target, axis=1)[inlier]
-    return RobustFit(transform, inlier, root_mean_square(errors))
+def errors_m(target_from_source: Sim3 | Affine9, source: FloatArray, target: FloatArray) -> FloatArray:
+    """How far each transformed point is from its counterpart, metres of the target, shape (K,), from shapes (K, 3)."""
+    return np.asarray(np.linalg.norm(target_from_source.apply(source) - target, axis=1))
 
 
 def root_mean_square(errors: FloatArray) -> float:

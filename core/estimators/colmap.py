@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from core.errors import Unavailable
-from core.estimators.base import MIN_CORRESPONDENCES, Estimator, RobustFit, no_agreement, refit, require_enough
+from core.estimators.base import MIN_CORRESPONDENCES, Estimator, RobustFit, errors_m, no_agreement, require_enough
 from core.sim3 import Sim3
 from core.views import FloatArray
 
@@ -25,7 +25,7 @@ def lo_ransac(source: FloatArray, target: FloatArray, threshold_m: float, seed: 
         raise no_agreement(source)
     similarity = found["tgt_from_src"]
     transform = Sim3(float(similarity.scale), np.asarray(similarity.rotation.matrix()), np.asarray(similarity.translation))
-    return refit(source, target, transform, np.linalg.norm(transform.apply(source) - target, axis=1) < threshold_m)
+    return RobustFit.of(source, target, transform, errors_m(transform, source, target) < threshold_m)
 
 
 OFFERS: Mapping[str, Estimator] = {"pycolmap": lo_ransac}

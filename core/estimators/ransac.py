@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from core.errors import NoPose
-from core.estimators.base import MAX_SCALE, MIN_CORRESPONDENCES, Estimator, RobustFit, no_agreement, refit, require_enough
+from core.estimators.base import MAX_SCALE, MIN_CORRESPONDENCES, Estimator, RobustFit, errors_m, no_agreement, require_enough
 from core.estimators.batched import Sim3Batch, umeyama_batch
 from core.sim3 import Sim3, umeyama
 from core.views import FloatArray
@@ -55,22 +55,18 @@ def _without_repeats(rng: np.random.Generator, trials: int, count: int) -> NDArr
 def polish(source: FloatArray, target: FloatArray, transform: Sim3, inlier: NDArray[np.bool_], threshold_m: float) -> RobustFit:
     """Least squares on the inliers while that lowers the squared errors, each of at most the threshold's: a transform that is bent to
     reach one more inlier has more of them, and is worse."""
-
-    def errors_of(transform: Sim3) -> FloatArray:
-        return np.asarray(np.linalg.norm(transform.apply(source) - target, axis=1))
-
-    cost = (np.minimum(errors_of(transform), threshold_m) ** 2).sum()
+    cost = (np.minimum(errors_m(transform, source, target), threshold_m) ** 2).sum()
     for _ in range(REFITS):
         try:
             refined = umeyama(source[inlier], target[inlier])
         except NoPose:
             break
-        errors = errors_of(refined)
+        errors = errors_m(refined, source, target)
         lower = (np.minimum(errors, threshold_m) ** 2).sum()
         if lower >= cost:
             break
         transform, inlier, cost = refined, errors < threshold_m, lower
-    return refit(source, target, transform, inlier)
+    return RobustFit.of(source, target, transform, inlier)
 
 
 OFFERS: Mapping[str, Estimator] = {"ransac": ransac}
