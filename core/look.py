@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 from core.coherence import require_one_unit
@@ -25,15 +26,20 @@ class Look:
     """What a burst shows."""
 
     burst: Burst
+    found: EncodedBurst
+    """All that was found in its views."""
     encoded: EncodedBurst
-    """Without what its views contradict of each other."""
-    grounds: Grounds
-    """How much an answer about it rests on."""
+    """Of that, what the views do not contradict of each other: what follows rests on this alone."""
+
+    @cached_property
+    def grounds(self) -> Grounds:
+        """How much an answer about it rests on; found when an answer asks for it."""
+        return grounds(self.burst, self.found, self.encoded)
 
 
 def look(burst: Burst, encoder: Encodes) -> Look:
     """Raises NoObject where no view shows an object, InvalidInput where depth and cameras are in different units."""
     found = encoder.encode(burst)
-    agreed = consistent_only(found)
-    require_one_unit(agreed)
-    return Look(burst, agreed, grounds(burst, found, agreed))
+    consistent = consistent_only(found)
+    require_one_unit(consistent)
+    return Look(burst, found, consistent)
