@@ -58,7 +58,7 @@ async def _once(request: Request, answer: Answering, route: str) -> Response:
         raise InvalidInput(KEY, f"has {len(key)} characters; send 1 to {LONGEST_KEY}, such as a UUID made anew for each request")
     digest = _digest(request, await request.body())
     # Entered on the event loop: the key travels to the thread that changes the memory in the context of this task.
-    with agent_of(request).memory.requests.once(key, route, digest, retold=route in request.app.state.made) as once:
+    with agent_of(request).memory.requests.once(key, route, digest) as once:
         if once.earlier is not None:
             return await run_sync(_again, request, once.earlier, route)
         response = await answer(request)

@@ -12,6 +12,7 @@ from core.views import Burst, FloatArray
 from service.events import Events
 from store.memory import Memory
 from store.records import Goal, Observation, Pose
+from store.requests import unnoted
 
 Source = Burst | str
 """A burst, or the id of an observation."""
@@ -81,7 +82,11 @@ class Rearranging:
 
     def _posed(self, category_id: str, source: Source, frame: str | None) -> tuple[Observation, Pose]:
         self._memory.categories.get(category_id)
-        seen = self._memory.observations.get(source) if isinstance(source, str) else self._observe(source, category_id, frame)
+        if isinstance(source, str):
+            seen = self._memory.observations.get(source)
+        else:
+            with unnoted():  # a repeated request is answered with its goal, or does all of it again
+                seen = self._observe(source, category_id, frame)
         if seen.category_id != category_id:
             raise Conflict(f"observation {seen.id!r} is not of category {category_id!r}; observe the object with category_id={category_id}")
         if seen.pose is None:

@@ -47,6 +47,16 @@ class Once:
     reply: Reply | None = None
 
 
+@contextmanager
+def unnoted() -> Iterator[None]:
+    """What is changed inside is not yet what the request is for: a process that ends before that begins the request anew."""
+    token = running_request.set(None)
+    try:
+        yield
+    finally:
+        running_request.reset(token)
+
+
 class Requests:
     """The repeatable requests of one memory."""
 
@@ -56,10 +66,8 @@ class Requests:
         self._running: set[tuple[str, str]] = set()
 
     @contextmanager
-    def once(self, key: str, route: str, digest: str, *, retold: bool = True) -> Iterator[Once]:
+    def once(self, key: str, route: str, digest: str) -> Iterator[Once]:
         """What is done inside counts as done for `key` on `route`; `digest` is the body's.
-
-        Where an answer was lost and cannot be `retold` from what the request made, the request is begun anew.
 
         Raises Conflict where the key came with another body, StillRunning where its first request is not answered yet.
         """
@@ -67,7 +75,7 @@ class Requests:
         with self._lock:
             if request in self._running:
                 raise StillRunning(f"the request with Idempotency-Key {key!r} is still being answered; repeat it later")
-            earlier = self._begin(key, route, digest, retold)
+            earlier = self._begin(key, route, digest)
             if earlier is None:
                 self._running.add(request)
         if earlier is not None:
@@ -95,14 +103,15 @@ class Requests:
         with self._connection.housekeeping() as db:
             db.execute("DELETE FROM requests WHERE created_at <= ?", [ago(self._connection.retention.requests)])
 
-    def _begin(self, key: str, route: str, digest: str, retold: bool) -> Earlier | None:
+    def _begin(self, key: str, route: str, digest: str) -> Earlier | None:
         row = only(self._connection.rows("SELECT * FROM requests WHERE key = ? AND route = ?", key, route))
         if row is not None and row["created_at"] > ago(self._connection.retention.requests):
             if row["digest"] != digest:
                 raise Conflict(f"Idempotency-Key {key!r} was used for another request; take a new key for each request")
-            reply = None if row["status"] is None else Reply(row["status"], row["media_type"], row["body"])
-            if reply is not None or retold:
-                return Earlier(reply, row["result_id"])
+            if row["status"] is not None:
+                return Earlier(Reply(row["status"], row["media_type"], row["body"]), row["result_id"])
+            if row["result_id"] is not None:
+                return Earlier(None, row["result_id"])
         with self._connection.housekeeping() as db:
             db.table("requests").insert({"key": key, "route": route, "digest": digest, "created_at": now()}, replace=True)
         return None

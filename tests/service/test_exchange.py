@@ -107,6 +107,19 @@ def test_a_plan_lost_with_the_process_is_made_anew_once(client, learn, look, par
     assert client.post(path, files=parts(look()), headers=KEY).json()["observation_id"] == again.json()["observation_id"]
 
 
+def test_a_goal_whose_process_ended_after_its_observation_is_made_at_the_repetition(client, ball, look, parts, monkeypatch):
+    path, goals = f"/v1/categories/{ball['id']}/goals", client.app.state.agent.memory.goals
+
+    def ended(*about, **more):
+        raise RuntimeError
+
+    with monkeypatch.context() as patch, pytest.raises(RuntimeError):
+        patch.setattr(goals, "create", ended)
+        client.post(path, files=parts(look()), headers=KEY)
+    again = client.post(path, files=parts(look()), headers=KEY)
+    assert (again.status_code, client.get(path).json()["goals"]) == (201, [again.json()])
+
+
 def test_the_same_request_twice_at_once_is_done_once(settings, backbone, look, parts):
     started, finish = threading.Event(), threading.Event()
 

@@ -17,7 +17,7 @@ from core.sim3 import Sim3
 from core.views import Burst
 from store.memory import Memory
 from store.records import Category
-from store.requests import Reply
+from store.requests import Reply, unnoted
 from store.retention import Retention
 from tests.store.conftest import NOVEL
 
@@ -46,15 +46,24 @@ def test_a_change_without_an_answer_is_known_by_what_it_made(folder: Path, reque
         assert (again.earlier.reply, again.earlier.result_id) == (None, scan.id)
 
 
-def test_a_lost_answer_that_cannot_be_told_again_is_made_anew_once(folder: Path, request_for_views: ScanRequest) -> None:
-    with Memory.open(folder) as memory, memory.requests.once("k", "r", "d", retold=False):
+def test_a_request_that_ended_before_what_it_is_for_is_begun_anew_once(folder: Path, request_for_views: ScanRequest) -> None:
+    with Memory.open(folder) as memory, memory.requests.once("k", "r", "d"), unnoted():
         memory.scans.create(request_for_views)
     with Memory.open(folder) as memory:
-        with memory.requests.once("k", "r", "d", retold=False) as anew:
+        with memory.requests.once("k", "r", "d") as anew:
             assert anew.earlier is None
             anew.reply = DONE
-        with memory.requests.once("k", "r", "d", retold=False) as again:
+        with memory.requests.once("k", "r", "d") as again:
             assert again.earlier.reply == DONE
+
+
+def test_what_a_request_is_for_is_known_by_its_id_whatever_came_before_it(memory: Memory, request_for_views: ScanRequest) -> None:
+    with memory.requests.once("k", "r", "d"):
+        with unnoted():
+            memory.scans.create(request_for_views)
+        scan = memory.scans.create(request_for_views)
+    with memory.requests.once("k", "r", "d") as again:
+        assert again.earlier.result_id == scan.id
 
 
 def test_work_that_failed_may_be_tried_again(memory: Memory) -> None:
