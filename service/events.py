@@ -7,8 +7,9 @@ import threading
 from collections import deque
 from collections.abc import AsyncIterator, Callable, Mapping
 from dataclasses import dataclass
-from datetime import datetime, timezone
 from typing import Any, Literal
+
+from store.times import now
 
 Kind = Literal[
     "observation",
@@ -78,7 +79,7 @@ class Events:
     def publish(self, kind: Kind, **about: Any) -> None:
         """Tells every listener; never waits for one."""
         with self._lock:
-            event = Event(self._next, kind, datetime.now(timezone.utc).isoformat(timespec="milliseconds"), about)
+            event = Event(self._next, kind, now(), about)
             self._next += 1
             self._history.append(event)
             for listener in self._listeners:

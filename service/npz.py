@@ -10,8 +10,7 @@ import math
 import struct
 import zipfile
 import zlib
-from tokenize import TokenError
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
 from numpy.lib import format as npy
@@ -19,11 +18,10 @@ from numpy.typing import NDArray
 
 from core.errors import InvalidInput
 from service.decoding import BurstLimits, Upload, assemble
+from store.untrusted import header
 
 DIMENSIONS = {"rgb": (4,), "depth_m": (3,), "K": (2, 3), "world_from_camera": (3,), "mask": (3,)}
 """The arrays that may be sent, and how many dimensions each may have."""
-HEADER_READERS = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
-MAX_HEADER_BYTES = 4096
 IMAGES = ("rgb", "depth_m", "mask")
 EXPECTED = {
     "rgb": "(V, H, W, 3)",
@@ -100,7 +98,10 @@ def _require_together(shapes: dict[str, tuple[int, ...]], limits: BurstLimits) -
 
 def _shape(archive: zipfile.ZipFile, name: str) -> tuple[int, ...]:
     with archive.open(f"{name}.npy") as stream:
-        shape, dtype = _header(stream, name)
+        try:
+            shape, dtype = header(stream)
+        except ValueError as error:
+            raise InvalidInput(name, f"is not a NumPy array ({error}); write the npz with numpy.savez") from None
     if dtype.kind not in "buif":
         raise InvalidInput(name, f"has type {dtype}; send plain numbers, never pickled objects")
     if len(shape) not in DIMENSIONS[name]:
@@ -116,12 +117,3 @@ def _array(archive: zipfile.ZipFile, name: str) -> NDArray[Any]:
         except ValueError as error:
             raise InvalidInput(name, f"cannot be read ({error}); write the npz with numpy.savez") from None
     return array
-
-
-def _header(stream: IO[bytes], name: str) -> tuple[tuple[int, ...], np.dtype[Any]]:
-    try:
-        version = npy.read_magic(stream)
-        shape, _, dtype = HEADER_READERS[version](stream, max_header_size=MAX_HEADER_BYTES)
-    except (ValueError, KeyError, SyntaxError, TokenError, RecursionError) as error:  # a header is parsed as Python
-        raise InvalidInput(name, f"is not a NumPy array ({error}); write the npz with numpy.savez") from None
-    return shape, dtype

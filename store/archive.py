@@ -24,13 +24,13 @@ from pydantic import BaseModel, ConfigDict, Field, StringConstraints
 from core.errors import Conflict, Unavailable
 from core.rearrange import Anchor
 from store.categories import Categories
-from store.columns import files_from_json
-from store.connection import Connection, Row, only
+from store.connection import Connection, Row
+from store.contents import files_of
 from store.folders import FileSum, make_parents, partial_of, problem, sync
 from store.instances import TOKENS, damaged
 from store.progress import Progress, untold
 from store.records import Assignment, Category
-from store.retention import now
+from store.times import now
 
 MANIFEST = "manifest.json"
 FILE_NAME = re.compile(r"\d{3}_(rgb|depth|mask)\.png|cameras\.json|reference(-\d+)?\.npz")
@@ -156,8 +156,7 @@ def export(
 
 
 def _category(connection: Connection, archive: zipfile.ZipFile, category: Category) -> CategoryEntry:
-    row = only(connection.rows("SELECT files FROM categories WHERE id = ?", category.id))
-    files = files_from_json(row["files"] if row else "{}")
+    files = files_of(connection, f"categories/{category.id}")
     for name, file in files.items():
         path = connection.root / "categories" / category.id / name
         if (wrong := problem(path, file)) is not None:

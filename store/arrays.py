@@ -15,6 +15,8 @@ from store.folders import Files, FileSum, read_whole
 Array = NDArray[Any]
 BLOB_TYPE = np.dtype("<f4")
 """Tokens are kept as they were computed: rounding them would make a restarted service decide otherwise."""
+PATCH_TYPE = np.dtype("<f2")
+"""Patches are drawn in half precision."""
 
 
 def write_arrays(path: Path, arrays: Mapping[str, Array]) -> str:
@@ -38,17 +40,13 @@ def arrays_file(files: Files) -> tuple[str, FileSum]:
     return next((name, file) for name, file in files.items() if name.endswith(".npz"))
 
 
-PATCH_TYPE = np.dtype("<f2")
-"""Patches are drawn in half precision."""
-
-
-def to_blob(tokens: NDArray[np.floating]) -> bytes:
+def tokens_to_blob(tokens: NDArray[np.floating]) -> bytes:
     """One token a view, shape (V, D), as bytes."""
     return np.ascontiguousarray(tokens, dtype=BLOB_TYPE).tobytes()
 
 
-def from_blob(blob: bytes, views: int) -> NDArray[np.float32]:
-    """The tokens of `to_blob`, shape (views, D)."""
+def tokens_from_blob(blob: bytes, views: int) -> NDArray[np.float32]:
+    """The tokens of `tokens_to_blob`, shape (views, D)."""
     return np.frombuffer(blob, BLOB_TYPE).reshape(views, -1).astype(np.float32, copy=False)
 
 

@@ -9,9 +9,9 @@ from typing import Any
 from sqlite_utils import Database
 
 from core.errors import NotFound
-from store.connection import Connection, Row, new_id, only
+from store.connection import Connection, Row, new_id
 from store.records import Action, AuditEntry
-from store.retention import ago, now
+from store.times import ago, now
 
 UNDOABLE: tuple[Action, ...] = ("rename", "merge", "split", "delete", "forget", "correct")
 
@@ -37,7 +37,7 @@ class Audit:
 
     def get(self, entry_id: str) -> AuditEntry:
         """Raises NotFound."""
-        row = only(self._connection.rows("SELECT * FROM audit WHERE id = ?", entry_id))
+        row = self._connection.row("SELECT * FROM audit WHERE id = ?", entry_id)
         if row is None:
             raise NotFound(f"no change has the id {entry_id!r}")
         return self._entry(row)

@@ -16,9 +16,10 @@ from core.errors import Conflict, Unavailable
 from store.check import Damage, check
 from store.columns import files_from_json
 from store.connection import DATABASE, Connection
+from store.contents import FOLDERS
 from store.folders import Files, make_parents, new_folder, partial_of, sync
 from store.progress import Progress, untold
-from store.sweep import FOLDERS, sweep
+from store.sweep import sweep
 
 ATTEMPTS = 10
 """A memory from which something is removed during each of so many copies of the missing folders is not at rest for a moment."""
@@ -62,11 +63,9 @@ def back_up(connection: Connection, folder: Path, progress: Progress = untold) -
         partial.rename(folder)
         sync(folder.parent)
     except OSError as error:
-        shutil.rmtree(partial, ignore_errors=True)
         raise Unavailable(f"cannot back up to {folder}: {error}; free space, or choose another folder") from error
-    except BaseException:
-        shutil.rmtree(partial, ignore_errors=True)
-        raise
+    finally:
+        shutil.rmtree(partial, ignore_errors=True)  # there is none once it has its name
     return Backup(folder, report.files, report.size, report.damages)
 
 

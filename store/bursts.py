@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from core.errors import Unavailable
+from core.errors import NotFound, Unavailable
 from core.views import Burst, Camera, View
 from store.folders import Files, read_whole
 
@@ -35,6 +35,12 @@ def read_burst(folder: Path, files: Files) -> Burst:
 def read_view(folder: Path, files: Files, index: int) -> View:
     """One view of `write_burst`; the caller knows that it has this many."""
     return _read_view(folder, files, index, _entries(folder, files)[index])
+
+
+def require_view(whose: str, views: int, index: int) -> None:
+    """Raises NotFound for a view that something does not have."""
+    if not 0 <= index < views:
+        raise NotFound(f"{whose} has the views 0 to {views - 1}, not {index}")
 
 
 def _name(index: int, kind: str) -> str:

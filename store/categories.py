@@ -15,15 +15,16 @@ from core.reference import Reference
 from core.views import Burst, View
 from store.arrays import arrays_file, read_arrays, write_arrays
 from store.audit import record
-from store.bursts import read_burst, read_view, write_burst
-from store.columns import files_from_json, files_to_json
-from store.connection import Connection, Row, new_id, only
+from store.bursts import read_burst, read_view, require_view, write_burst
+from store.columns import files_to_json
+from store.connection import Connection, Row, new_id
+from store.contents import files_of
 from store.folders import Files
 from store.instances import Instances, insert_instance
 from store.overview import Listing, Order, Summary, listing
 from store.records import Category
-from store.retention import now
 from store.scans import OPEN
+from store.times import now
 
 SELECT = """
     SELECT c.*, (SELECT count(*) FROM instances i WHERE i.category_id = c.id AND i.removed_by IS NULL) AS instances
@@ -82,7 +83,7 @@ class Categories:
 
     def get(self, category_id: str) -> Category:
         """Raises NotFound."""
-        row = only(self._connection.rows(f"{SELECT} AND c.id = ?", category_id))
+        row = self._connection.row(f"{SELECT} AND c.id = ?", category_id)
         if row is None:
             raise NotFound(f"no category has the id {category_id!r}; GET /v1/categories lists them")
         return _category(row)
@@ -158,7 +159,7 @@ class Categories:
 
     def view(self, category_id: str, index: int) -> View:
         """One reference view. Raises NotFound, and Unavailable where it is damaged."""
-        self._require_view(category_id, index)
+        require_view(f"category {category_id!r}", self.get(category_id).views, index)
         return read_view(self.folder(category_id), self._files(category_id), index)
 
     def folder(self, category_id: str) -> Path:
@@ -166,13 +167,7 @@ class Categories:
         return self.root / category_id
 
     def _files(self, category_id: str) -> Files:
-        rows = self._connection.rows("SELECT files FROM categories WHERE id = ?", self.get(category_id).id)
-        return files_from_json(rows[0]["files"])
-
-    def _require_view(self, category_id: str, index: int) -> None:
-        category = self.get(category_id)
-        if not 0 <= index < category.views:
-            raise NotFound(f"category {category_id!r} has the views 0 to {category.views - 1}, not {index}")
+        return files_of(self._connection, f"categories/{self.get(category_id).id}")
 
     def _require_part(self, category_id: str, instance_ids: list[str]) -> None:
         self.get(category_id)

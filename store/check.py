@@ -7,10 +7,10 @@ from typing import Literal
 
 from store.columns import files_from_json
 from store.connection import DATABASE, Connection, Row
+from store.contents import FOLDERS
 from store.folders import Files, problem
 from store.instances import TOKENS, damaged
 from store.progress import Progress, untold
-from store.sweep import FOLDERS
 
 Kind = Literal["database", "category", "instance", "observation", "scan"]
 KINDS: dict[str, Kind] = {"categories": "category", "observations": "observation", "scan_bursts": "scan"}

@@ -84,6 +84,10 @@ class Connection:
                 f"the memory in {self.root} does not answer: {error}; check its disk, then start the service again"
             ) from error
 
+    def row(self, sql: str, *parameters: object) -> Row | None:
+        """The first row of a SELECT, None where there is none. Raises as `rows` does."""
+        return next(iter(self.rows(sql, *parameters)), None)
+
     def require_sound(self) -> None:
         """Raises Unavailable where the database cannot be read, or where writing failed the last time and still does."""
         self.rows("SELECT value FROM meta WHERE key = 'memory_version'")
@@ -192,8 +196,3 @@ class Connection:
 def new_id() -> str:
     """An id no other memory has."""
     return uuid.uuid4().hex
-
-
-def only(rows: Sequence[Row]) -> Row | None:
-    """The row of a query by id, or None."""
-    return rows[0] if rows else None

@@ -7,9 +7,9 @@ from core.rearrange import Anchor
 from core.sim3 import Sim3
 from store.categories import Categories
 from store.columns import sim3_from_json, sim3_to_json
-from store.connection import Connection, Row, new_id, only
+from store.connection import Connection, Row, new_id
 from store.records import Goal
-from store.retention import now
+from store.times import now
 
 SELECT = "SELECT g.* FROM goals g JOIN categories c ON c.id = g.category_id WHERE c.removed_by IS NULL"
 
@@ -47,7 +47,7 @@ class Goals:
 
     def get(self, goal_id: str) -> Goal:
         """Raises NotFound."""
-        row = only(self._connection.rows(f"{SELECT} AND g.id = ?", goal_id))
+        row = self._connection.row(f"{SELECT} AND g.id = ?", goal_id)
         if row is None:
             raise NotFound(f"no goal has the id {goal_id!r}; GET /v1/categories/{{id}}/goals lists a category's")
         return _goal(row)

@@ -22,13 +22,13 @@ from core.evidence import sample_patches
 from core.nearness import Listed
 from core.novelty import Member
 from core.views import Burst
-from store.arrays import BLOB_TYPE, Array, from_blob, patches_from_blob, patches_to_blob, to_blob
+from store.arrays import BLOB_TYPE, Array, patches_from_blob, patches_to_blob, tokens_from_blob, tokens_to_blob
 from store.audit import record
 from store.bursts import read_burst
-from store.columns import files_from_json
-from store.connection import Connection, Row, new_id, only
+from store.connection import Connection, Row, new_id
+from store.contents import files_of
 from store.records import Assignment, Instance
-from store.retention import now
+from store.times import now
 
 COLUMNS = "i.id, i.category_id, i.created_at, i.source, i.source_id, i.how, i.similarity, i.views, i.pictures"
 LIVING = "FROM instances i JOIN categories c ON c.id = i.category_id WHERE i.removed_by IS NULL AND c.removed_by IS NULL"
@@ -66,7 +66,7 @@ class Instances:
 
     def get(self, instance_id: str) -> Instance:
         """Raises NotFound."""
-        row = only(self._connection.rows(f"SELECT {COLUMNS} {LIVING} AND i.id = ?", instance_id))
+        row = self._connection.row(f"SELECT {COLUMNS} {LIVING} AND i.id = ?", instance_id)
         if row is None:
             raise NotFound(f"no instance has the id {instance_id!r}; GET /v1/categories/{{id}}/instances lists those of a category")
         return Instance(**row)
@@ -76,9 +76,7 @@ class Instances:
         instance = self.get(instance_id)
         if instance.pictures is None:
             raise Unavailable(f"the views of instance {instance_id!r} are no longer kept: its observation was dropped as one of the oldest")
-        table, _, row_id = instance.pictures.partition("/")
-        (row,) = self._connection.rows(f"SELECT files FROM {table} WHERE id = ?", row_id)
-        return read_burst(self._connection.root / instance.pictures, files_from_json(row["files"]))
+        return read_burst(self._connection.root / instance.pictures, files_of(self._connection, instance.pictures))
 
     def forget(self, category_id: str, instance_id: str, *, actor: str | None = None) -> None:
         """Takes one out of a category. Raises NotFound, and Conflict for a category's last."""
@@ -118,7 +116,7 @@ class Instances:
         found = {}
         for row in self._rows(ids, "id, views, pooled, typeof(patches) AS patches"):
             if row["patches"] != "null":
-                mean = from_blob(row["pooled"], row["views"]).mean(axis=0)
+                mean = tokens_from_blob(row["pooled"], row["views"]).mean(axis=0)
                 if np.isfinite(mean).all():
                     found[row["id"]] = mean
                 else:
@@ -143,9 +141,11 @@ class Instances:
         """Tokens by instance; what was read once stays in memory."""
         kept = {each: tokens for each, tokens in self._tokens.items() if each in wanted}
         for row in self._rows(sorted(wanted - kept.keys()), f"id, views, {', '.join(TOKENS)}, tokens_sha256"):
-            kept[row["id"]] = None if damaged(row) else (from_blob(row["cls"], row["views"]), from_blob(row["pooled"], row["views"]))
-            if kept[row["id"]] is None:
+            if damaged(row):
+                kept[row["id"]] = None
                 self._tell(row["id"])
+            else:
+                kept[row["id"]] = tokens_from_blob(row["cls"], row["views"]), tokens_from_blob(row["pooled"], row["views"])
         self._tokens = kept
         return kept
 
@@ -173,8 +173,8 @@ def tokens_sha256(row: Row) -> str:
 def token_columns(encoded: EncodedBurst) -> Row:
     """The columns of an instance that a backbone computed."""
     row: Row = {
-        "cls": to_blob(encoded.cls),
-        "pooled": to_blob(encoded.pooled),
+        "cls": tokens_to_blob(encoded.cls),
+        "pooled": tokens_to_blob(encoded.pooled),
         "patches": patches_to_blob(sample_patches(encoded)),
     }
     return row | {"views": len(encoded.cls), "tokens_sha256": tokens_sha256(row)}

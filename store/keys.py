@@ -14,8 +14,8 @@ from typing import Literal, get_args
 
 from core.errors import Conflict, InvalidInput, NotFound
 from store.audit import record
-from store.connection import Connection, Row, only
-from store.retention import now
+from store.connection import Connection, Row
+from store.times import now
 
 Role = Literal["viewer", "robot", "admin"]
 """Each may do what the ones before it may."""
@@ -87,7 +87,7 @@ class Keys:
         """The valid key that reads so. How long it takes tells nothing of how much of the secret is right."""
         prefix, _, rest = text.partition("_")
         key_id, _, secret = rest.partition("_")
-        row = only(self._connection.rows("SELECT * FROM keys WHERE id = ? AND revoked_at IS NULL", key_id))
+        row = self._connection.row("SELECT * FROM keys WHERE id = ? AND revoked_at IS NULL", key_id)
         right = hmac.compare_digest(sha256_of(secret), row["sha256"] if row else NOBODY)
         return key_of(row) if row and right and prefix == PREFIX else None
 

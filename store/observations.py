@@ -17,23 +17,23 @@ from core.novelty import Decision, Outcome
 from core.scan import ScanRequest
 from core.views import Burst, View
 from store.arrays import Array, arrays_file, read_arrays, write_arrays
-from store.bursts import read_burst, read_view, write_burst
+from store.bursts import read_burst, read_view, require_view, write_burst
 from store.columns import (
     decision_from_json,
     decision_to_json,
-    files_from_json,
     files_to_json,
     grounds_from_json,
     grounds_to_json,
     pose_from_json,
     pose_to_json,
 )
-from store.connection import Connection, Row, new_id, only
+from store.connection import Connection, Row, new_id
+from store.contents import files_of
 from store.folders import Files
 from store.instances import insert_instance
 from store.records import Assignment, Observation, Pose
-from store.retention import ahead, now
 from store.scans import insert_scan
+from store.times import ahead, now
 
 SELECT = """
     SELECT o.*, c.id AS living_category_id, k.id AS living_corrected_to,
@@ -145,16 +145,14 @@ class Observations:
 
     def get(self, observation_id: str) -> Observation:
         """Raises NotFound."""
-        row = only(self._connection.rows(f"{SELECT} WHERE o.id = ?", observation_id))
+        row = self._connection.row(f"{SELECT} WHERE o.id = ?", observation_id)
         if row is None:
             raise NotFound(f"no observation has the id {observation_id!r}; GET /v1/observations lists them")
         return _observation(row)
 
     def view(self, observation_id: str, index: int) -> View:
         """One of its views. Raises NotFound, and Unavailable where it is damaged."""
-        observation = self.get(observation_id)
-        if not 0 <= index < observation.views:
-            raise NotFound(f"observation {observation_id!r} has the views 0 to {observation.views - 1}, not {index}")
+        require_view(f"observation {observation_id!r}", self.get(observation_id).views, index)
         return read_view(self.folder(observation_id), self._files(observation_id), index)
 
     def burst(self, observation_id: str) -> Burst:
@@ -177,8 +175,7 @@ class Observations:
         self._connection.remove([self.folder(each) for each in dropped])
 
     def _files(self, observation_id: str) -> Files:
-        rows = self._connection.rows("SELECT files FROM observations WHERE id = ?", self.get(observation_id).id)
-        return files_from_json(rows[0]["files"])
+        return files_of(self._connection, f"observations/{self.get(observation_id).id}")
 
     def _drop_oldest(self, db: Database) -> list[str]:
         """Within a transaction; returns which, whose folders go once it is committed."""

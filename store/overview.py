@@ -14,6 +14,14 @@ ORDERS: dict[Order, str] = {
     "learnt": "c.rowid DESC",
     "instances": "instances DESC, c.rowid",
 }
+QUERY = """
+    SELECT c.id, c.name, c.created_at, c.views,
+        (SELECT count(*) FROM instances i WHERE i.category_id = c.id AND i.removed_by IS NULL) AS instances,
+        coalesce((SELECT max(o.created_at) FROM observations o WHERE o.category_id = c.id), c.created_at) AS last_seen,
+        (SELECT count(*) FROM observations o WHERE o.category_id = c.id) AS recognised,
+        (SELECT count(*) FROM observations o WHERE o.category_id = c.id AND o.pose_error IS NOT NULL) AS without_pose
+    FROM categories c WHERE c.removed_by IS NULL
+"""
 
 
 @dataclass(frozen=True)
@@ -41,16 +49,6 @@ class Listing:
     categories: tuple[Summary, ...]
     total: int
     """On all pages."""
-
-
-QUERY = """
-    SELECT c.id, c.name, c.created_at, c.views,
-        (SELECT count(*) FROM instances i WHERE i.category_id = c.id AND i.removed_by IS NULL) AS instances,
-        coalesce((SELECT max(o.created_at) FROM observations o WHERE o.category_id = c.id), c.created_at) AS last_seen,
-        (SELECT count(*) FROM observations o WHERE o.category_id = c.id) AS recognised,
-        (SELECT count(*) FROM observations o WHERE o.category_id = c.id AND o.pose_error IS NOT NULL) AS without_pose
-    FROM categories c WHERE c.removed_by IS NULL
-"""
 
 
 def listing(connection: Connection, limit: int, offset: int, *, order: Order = "name", called: str | None = None) -> Listing:

@@ -24,10 +24,11 @@ from store.bursts import read_burst
 from store.categories import reference_columns
 from store.columns import files_from_json, files_to_json
 from store.connection import Connection, Row
+from store.contents import FOLDERS
 from store.folders import Files, FileSum, sync
 from store.instances import insert_instance, token_columns
 from store.progress import Progress, untold
-from store.sweep import FOLDERS, sweep
+from store.sweep import sweep
 
 
 @dataclass(frozen=True)

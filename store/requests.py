@@ -12,8 +12,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 from core.errors import Conflict
-from store.connection import Connection, only, running_request
-from store.retention import ago, now
+from store.connection import Connection, running_request
+from store.times import ago, now
 
 
 class StillRunning(Conflict):
@@ -104,7 +104,7 @@ class Requests:
             db.execute("DELETE FROM requests WHERE created_at <= ?", [ago(self._connection.retention.requests)])
 
     def _begin(self, key: str, route: str, digest: str) -> Earlier | None:
-        row = only(self._connection.rows("SELECT * FROM requests WHERE key = ? AND route = ?", key, route))
+        row = self._connection.row("SELECT * FROM requests WHERE key = ? AND route = ?", key, route)
         if row is not None and row["created_at"] > ago(self._connection.retention.requests):
             if row["digest"] != digest:
                 raise Conflict(f"Idempotency-Key {key!r} was used for another request; take a new key for each request")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from datetime import datetime, timedelta, timezone
+from datetime import timedelta
 
 from core.errors import InvalidInput
 
@@ -24,22 +24,3 @@ class Retention:
     def __post_init__(self) -> None:
         if self.observations < 1:
             raise InvalidInput("observations", f"found {self.observations}, expected at least 1 to keep")
-
-
-def now() -> str:
-    """The time in UTC, ISO 8601; later times sort later."""
-    return _text(datetime.now(timezone.utc))
-
-
-def ago(span: timedelta) -> str:
-    """What `now` was that long ago."""
-    return _text(datetime.now(timezone.utc) - span)
-
-
-def ahead(span: timedelta) -> str:
-    """What `now` will be after that long."""
-    return _text(datetime.now(timezone.utc) + span)
-
-
-def _text(time: datetime) -> str:
-    return time.isoformat(timespec="milliseconds")

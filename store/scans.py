@@ -13,10 +13,10 @@ from core.scan import ScanRequest
 from core.views import Burst
 from store.bursts import read_burst, write_burst
 from store.columns import files_from_json, files_to_json, request_from_json, request_to_json
-from store.connection import Connection, Row, new_id, only
+from store.connection import Connection, Row, new_id
 from store.folders import Files
 from store.records import Scan
-from store.retention import ahead, now
+from store.times import ahead, now
 
 SELECT = """
     SELECT s.id, s.created_at, s.state, s.request, s.observation_id, c.id AS category_id, s.expires_at,
@@ -42,7 +42,7 @@ class Scans:
 
     def get(self, scan_id: str) -> Scan:
         """Raises NotFound."""
-        row = only(self._connection.rows(f"{SELECT} WHERE s.id = ?", scan_id))
+        row = self._connection.row(f"{SELECT} WHERE s.id = ?", scan_id)
         if row is None:
             raise NotFound(f"no scan has the id {scan_id!r}; POST /v1/scans begins one")
         return _scan(row)

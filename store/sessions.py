@@ -5,9 +5,9 @@ from __future__ import annotations
 import secrets
 from datetime import timedelta
 
-from store.connection import Connection, only
+from store.connection import Connection
 from store.keys import Key, key_of, sha256_of
-from store.retention import ahead, now
+from store.times import ahead, now
 
 BYTES = 32
 
@@ -32,7 +32,7 @@ class Sessions:
         The token is looked up by its hash: how long that takes tells of the hash, which nobody can choose.
         """
         query = "SELECT k.* FROM sessions s JOIN keys k ON k.id = s.key_id WHERE s.sha256 = ? AND s.expires_at > ? AND k.revoked_at IS NULL"
-        row = only(self._connection.rows(query, sha256_of(token), now()))
+        row = self._connection.row(query, sha256_of(token), now())
         return key_of(row) if row else None
 
     def end(self, token: str) -> None:

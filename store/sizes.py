@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from store.connection import DATABASE, Connection
+from store.contents import FOLDERS
 from store.instances import LIVING
 from store.scans import OPEN
-from store.sweep import FOLDERS
 
 BYTES = "SELECT coalesce(sum(json_extract(each.value, '$[0]')), 0) AS n FROM {table} AS kept, json_each(kept.files) AS each"
 """Of the files that a table's rows name; SQLite adds them up ten times as fast as Python reads them."""

@@ -2,21 +2,15 @@
 
 from __future__ import annotations
 
-from core.errors import Unavailable
+from core.errors import NotFound, Unavailable
 from core.packing import burst_from_arrays
 from store.arrays import arrays_file, read_arrays
 from store.columns import files_from_json, files_to_json
 from store.connection import Connection
+from store.contents import FOLDERS, files_of
 from store.folders import remove_orphans, sums
 from store.instances import damaged, token_columns
-from store.retention import ago, ahead
-
-FOLDERS = {
-    "categories": "SELECT id, 'categories/' || id AS folder, files FROM categories",
-    "observations": "SELECT id, 'observations/' || id AS folder, files FROM observations",
-    "scan_bursts": "SELECT id, 'scans/' || scan_id || '/' || id AS folder, files FROM scan_bursts",
-}
-"""Each table whose rows have a folder, and where it is below the memory's."""
+from store.times import ago, ahead
 
 
 def seal(connection: Connection) -> None:
@@ -35,12 +29,10 @@ def seal(connection: Connection) -> None:
 
 def _complete_tokens(connection: Connection, pictures: str) -> None:
     """Draws the patch tokens of the instances that a folder shows from its arrays, where these are those of the instances."""
-    table, _, row_id = pictures.partition("/")
-    (row,) = connection.rows(f"SELECT files FROM {table} WHERE id = ?", row_id)
     try:
-        name, file = arrays_file(files_from_json(row["files"]))
+        name, file = arrays_file(files_of(connection, pictures))
         columns = token_columns(burst_from_arrays(read_arrays(connection.root / pictures / name, file.sha256)))
-    except (Unavailable, LookupError, StopIteration):  # damaged, or no arrays of a burst: such an instance stays as it is
+    except (NotFound, Unavailable, LookupError, StopIteration):  # damaged, or no arrays of a burst: such an instance stays as it is
         return
     with connection.housekeeping() as db:
         for instance in list(db.query("SELECT * FROM instances WHERE patches IS NULL AND pictures = ?", [pictures])):

@@ -90,17 +90,26 @@ def arrays(npz: bytes, name: str) -> Mapping[str, NDArray[Any]]:
         return {each.removesuffix(".npy"): _array(content(archive, info), f"{name}: {each}") for each, info in found.items()}
 
 
-def _array(written: bytes, name: str) -> NDArray[Any]:
-    stream = io.BytesIO(written)
+def header(stream: IO[bytes]) -> tuple[tuple[int, ...], np.dtype[Any]]:
+    """Shape and type of the array that a stream begins with, which is left where its content starts. Raises ValueError."""
     try:
         version = npy.read_magic(stream)
         shape, _, dtype = HEADER_READERS[version](stream, max_header_size=MAX_HEADER_BYTES)
+    except (KeyError, SyntaxError, TokenError, RecursionError) as error:  # a header is parsed as Python
+        raise ValueError(str(error)) from None
+    return shape, dtype
+
+
+def _array(written: bytes, name: str) -> NDArray[Any]:
+    stream = io.BytesIO(written)
+    try:
+        shape, dtype = header(stream)
         if dtype.kind not in "biufU" or not dtype.itemsize:
             raise InvalidInput(FIELD, f"{name!r} has type {dtype}; only plain numbers and text are read, never pickled objects")
         if min(shape, default=0) < 0 or math.prod(shape) * dtype.itemsize != len(written) - stream.tell():
             raise InvalidInput(FIELD, f"{name!r} has not the size that its shape {shape} says")
         stream.seek(0)
         found: NDArray[Any] = npy.read_array(stream, allow_pickle=False)
-    except (ValueError, KeyError, SyntaxError, TokenError, RecursionError) as error:  # what parsing its header raises
+    except ValueError as error:
         raise InvalidInput(FIELD, f"{name!r} is no NumPy array ({error})") from None
     return found

@@ -113,9 +113,10 @@ def test_a_goal_whose_process_ended_after_its_observation_is_made_at_the_repetit
     def ended(*about, **more):
         raise RuntimeError
 
-    with monkeypatch.context() as patch, pytest.raises(RuntimeError):
+    with monkeypatch.context() as patch:
         patch.setattr(goals, "create", ended)
-        client.post(path, files=parts(look()), headers=KEY)
+        with pytest.raises(RuntimeError):
+            client.post(path, files=parts(look()), headers=KEY)
     again = client.post(path, files=parts(look()), headers=KEY)
     assert (again.status_code, client.get(path).json()["goals"]) == (201, [again.json()])
 

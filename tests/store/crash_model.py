@@ -12,9 +12,9 @@ from core.encode import EncodedBurst
 from core.reference import Reference
 from core.views import Burst
 from store.columns import files_from_json
+from store.contents import FOLDERS
 from store.folders import sums
 from store.memory import Memory
-from store.sweep import FOLDERS
 
 
 @dataclass

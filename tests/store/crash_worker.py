@@ -28,11 +28,11 @@ from core.novelty import DecisionConfig, decide
 from core.reference import Reference
 from core.views import Burst
 from store.columns import files_from_json
+from store.contents import FOLDERS
 from store.folders import sums
 from store.memory import Memory
 from store.observations import Answer, Joins
 from store.scans import ScanRequest
-from store.sweep import FOLDERS
 
 MOST_CATEGORIES = 6
 Known = dict[str, list[Any]]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from core.errors import Unavailable
-from store.arrays import from_blob, read_arrays, to_blob, write_arrays
+from store.arrays import read_arrays, tokens_from_blob, tokens_to_blob, write_arrays
 
 
 def test_arrays_come_back_with_type_and_shape(tmp_path: Path) -> None:
@@ -41,4 +41,4 @@ def test_a_missing_file_is_named(tmp_path: Path) -> None:
 
 def test_tokens_survive_a_blob_exactly() -> None:
     tokens = np.random.default_rng(0).normal(size=(3, 7)).astype(np.float32)
-    assert np.array_equal(from_blob(to_blob(tokens), 3), tokens)
+    assert np.array_equal(tokens_from_blob(tokens_to_blob(tokens), 3), tokens)

@@ -18,9 +18,9 @@ from core.scan import ScanRequest
 from core.views import Burst
 from store import retention
 from store.connection import TRIAL
+from store.contents import FOLDERS
 from store.memory import Memory
 from store.records import Category
-from store.sweep import FOLDERS
 from tests.faults import Disk, failing, tapped
 from tests.store.conftest import NOVEL
 

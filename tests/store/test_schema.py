@@ -17,11 +17,11 @@ from core.evidence import sample_patches
 from core.reference import Reference
 from core.views import Burst
 from store.columns import files_from_json
+from store.contents import FOLDERS
 from store.folders import sums
 from store.memory import Memory
 from store.records import Category
 from store.schema import upgrade
-from store.sweep import FOLDERS
 
 
 @pytest.fixture
