@@ -32,8 +32,10 @@ from service.events import Event, Events
 from service.limits import BodyLimits
 from service.logs import Logged, log_event
 from service.metrics import Measured, Metrics
+from service.routes.install import MADE
 from service.routes.install import install as install_endpoints
 from service.settings import Settings
+from service.state import Running
 from store.memory import Memory
 
 DESCRIPTION = """A growing memory of object categories for robots: look once at one object, then find and pose others of its kind.
@@ -64,9 +66,19 @@ def create_app(
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         with open_agent(settings, metrics, backbone, compute) as agent:
-            app.state.agent = agent
-            app.state.guard = Guard(agent.memory.keys, agent.memory.sessions, settings.rate_limit, asks=asks)
-            app.state.work = work = metrics.watched_queue(settings.workers, settings.queue, settings.deadline_s)
+            work = metrics.watched_queue(settings.workers, settings.queue, settings.deadline_s)
+            demo = Demo()
+            app.state.running = Running(
+                settings=settings,
+                metrics=metrics,
+                agent=agent,
+                guard=Guard(agent.memory.keys, agent.memory.sessions, settings.rate_limit, asks=asks),
+                work=work,
+                demo=demo,
+                made=MADE,
+                tracks=set(),
+                warm=warm,
+            )
             metrics.tell_build(agent.backbone.name)
             async with anyio.create_task_group() as tasks:
                 tasks.start_soon(_keep_pruned, agent.memory)
@@ -74,7 +86,7 @@ def create_app(
                     yield
                 finally:
                     work.stop()
-                    await run_sync(app.state.demo.close)
+                    await run_sync(demo.close)
                     await work.finished()  # the memory is closed after this
                 tasks.cancel_scope.cancel()
 
@@ -85,11 +97,6 @@ def create_app(
         lifespan=lifespan,
         generate_unique_id_function=lambda route: route.name,
     )
-    app.state.settings = settings
-    app.state.metrics = metrics
-    app.state.tracks = 0
-    app.state.warm = warm
-    app.state.demo = Demo()
     app.add_middleware(BodyLimits, max_mb=settings.max_upload_mb, bodies=settings.workers + settings.queue, deadline_s=settings.deadline_s)
     app.add_middleware(OwnPagesOnly)
     app.add_middleware(Measured, metrics=metrics)

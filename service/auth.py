@@ -6,14 +6,10 @@ Who has no key can only be let in while there never was one, which takes a servi
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Coroutine
 from dataclasses import dataclass
 from ipaddress import ip_address
-from typing import Any
 
 from anyio.to_thread import run_sync
-from fastapi import Request, Response, WebSocket
-from fastapi.routing import APIRoute
 from starlette.requests import HTTPConnection
 
 from service.access import ADMIN, allows, needed_role
@@ -23,7 +19,6 @@ from service.refusals import NoKey, NotAllowed, TooOften
 from store.keys import Key, Keys, Role
 from store.sessions import Sessions
 
-Answering = Callable[[Request], Coroutine[Any, Any, Response]]
 COOKIE = "onelook_session"
 LONGEST_ACTOR = 200
 HOW = "send the header `Authorization: Bearer KEY` (ONELOOK_API_KEY for the client and the commands)"
@@ -98,38 +93,6 @@ class Guard:
         if wait_s:
             limit = f"{self._per_minute} requests a minute (ONELOOK_RATE_LIMIT)"
             raise TooOften(f"the key {key.name!r} has used up its {limit}; ask again in {wait_s} s", wait_s)
-
-
-class GuardedRoute(APIRoute):
-    """A route whose caller must have the role that `service.access` says."""
-
-    kind = ""
-    """Before the route's name in that table."""
-
-    def get_route_handler(self) -> Answering:
-        """FastAPI's, with `around` about it, and the guard before both."""
-        answer = self.around(super().get_route_handler())
-        needed = needed_role(self.kind + self.name)
-
-        async def guarded(request: Request) -> Response:
-            await request.app.state.guard.admit(request, needed)
-            return await answer(request)
-
-        return guarded
-
-    def around(self, answer: Answering) -> Answering:
-        """What else a kind of routes does; here nothing."""
-        return answer
-
-
-def admit_socket(name: str) -> Callable[[WebSocket], Coroutine[Any, Any, None]]:
-    """A dependency that does the same for the WebSocket route of this name, before the connection is accepted."""
-    needed = needed_role(name)
-
-    async def admit(socket: WebSocket) -> None:
-        await socket.app.state.guard.admit(socket, needed)
-
-    return admit
 
 
 def _bearer(header: str) -> str:

@@ -73,16 +73,14 @@ class Curation:
 
     def merge(self, category_id: str, into_id: str, *, actor: str | None = None) -> Category:
         """The bursts of one category join another, whose reference stays. Raises NotFound, InvalidInput for a category with itself."""
-        if category_id == into_id:
-            raise InvalidInput("from", "is the category itself; name another one")
+        _require_two("from", category_id, into_id)
         category = self._memory.categories.merge(category_id, into_id, actor=actor)
         self._events.publish("category_merged", id=category_id, into=into_id)
         return category
 
     def preview_merge(self, category_id: str, into_id: str) -> MergePreview:
         """What `merge` would do; changes nothing. Raises as it does, and Unavailable where tokens are damaged."""
-        if category_id == into_id:
-            raise InvalidInput("into", "is the category itself; name another one")
+        _require_two("into", category_id, into_id)
         gone, stays = (self._memory.categories.get(each) for each in (category_id, into_id))
         between, inside = self.similarities(category_id), self.similarities(into_id)
         own = np.eye(len(inside.matrix), dtype=bool)
@@ -169,6 +167,11 @@ class Curation:
             f"none of these instances can be a reference: that takes the kept views of one, at least {MIN_VIEWS} with cameras and depth; "
             "scan the object instead"
         )
+
+
+def _require_two(field: str, category_id: str, into_id: str) -> None:
+    if category_id == into_id:
+        raise InvalidInput(field, "is the category itself; name another one")
 
 
 def _sound(burst: Burst) -> list[int]:

@@ -17,12 +17,13 @@ from core.errors import InvalidInput
 from core.views import Burst
 from service.agent import Agent
 from service.auth import LONGEST_ACTOR, Caller
+from service.console.demo import Demo
 from service.decoding import BurstLimits, Parts, Upload, decode_parts
 from service.limits import media_type
 from service.metrics import Metrics
 from service.npz import decode_npz
 from service.settings import Settings
-from service.state import agent_of, caller_of, metrics_of, settings_of
+from service.state import caller_of, running
 from service.work import WorkQueue
 
 IMAGE_PARTS = ("rgb", "depth", "mask")
@@ -53,8 +54,28 @@ class RequestWork:
             pass
 
 
+def _agent(request: Request) -> Agent:
+    return running(request).agent
+
+
+def _settings(request: Request) -> Settings:
+    return running(request).settings
+
+
+def _metrics(request: Request) -> Metrics:
+    return running(request).metrics
+
+
+def _demo(request: Request) -> Demo:
+    return running(request).demo
+
+
 def _work(request: Request) -> RequestWork:
-    return RequestWork(request.app.state.work, request)
+    return RequestWork(running(request).work, request)
+
+
+def _caller(request: Request) -> Caller:
+    return caller_of(request)
 
 
 def _actor(
@@ -74,7 +95,7 @@ def _actor(
 
 async def read_upload(request: Request) -> Decode:
     """The burst in the body, in either form, to be decoded where work is done. Raises InvalidInput, HTTPException 415."""
-    settings = settings_of(request)
+    settings = running(request).settings
     limits = BurstLimits(settings.max_views, settings.max_megapixels)
     kind = media_type(request.headers)
     if kind == "application/x-npz":
@@ -152,10 +173,11 @@ async def _burst_part(form: FormData) -> str | bytes:
     return value if isinstance(value, str) else await value.read()
 
 
-AgentDep = Annotated[Agent, Depends(agent_of)]
-SettingsDep = Annotated[Settings, Depends(settings_of)]
-MetricsDep = Annotated[Metrics, Depends(metrics_of)]
-CallerDep = Annotated[Caller, Depends(caller_of)]
+AgentDep = Annotated[Agent, Depends(_agent)]
+SettingsDep = Annotated[Settings, Depends(_settings)]
+MetricsDep = Annotated[Metrics, Depends(_metrics)]
+DemoDep = Annotated[Demo, Depends(_demo)]
+CallerDep = Annotated[Caller, Depends(_caller)]
 WorkDep = Annotated[RequestWork, Depends(_work)]
 ActorDep = Annotated[str | None, Depends(_actor)]
 UploadDep = Annotated[Decode, Depends(read_upload)]

@@ -8,8 +8,8 @@ from anyio.to_thread import run_sync
 from fastapi import Request, Response
 
 from core.errors import InvalidInput
-from service.auth import Answering, GuardedRoute
-from service.state import agent_of
+from service.guarded import Answering, GuardedRoute
+from service.state import running
 from store.requests import Earlier, Reply
 
 KEY = "Idempotency-Key"
@@ -40,7 +40,7 @@ class MemoryRoute(GuardedRoute):
 
 
 async def _conditional(request: Request, answer: Answering) -> Response:
-    memory = agent_of(request).memory
+    memory = running(request).agent.memory
     version = await run_sync(lambda: memory.version)  # before the answer is made: it may be newer than its tag, never older
     tag = f'W/"{version}"'
     known = {each.strip() for each in request.headers.get("if-none-match", "").split(",")}
@@ -58,7 +58,7 @@ async def _once(request: Request, answer: Answering, route: str) -> Response:
         raise InvalidInput(KEY, f"has {len(key)} characters; send 1 to {LONGEST_KEY}, such as a UUID made anew for each request")
     digest = _digest(request, await request.body())
     # Entered on the event loop: the key travels to the thread that changes the memory in the context of this task.
-    with agent_of(request).memory.requests.once(key, route, digest) as once:
+    with running(request).agent.memory.requests.once(key, route, digest) as once:
         if once.earlier is not None:
             return await run_sync(_again, request, once.earlier, route)
         response = await answer(request)
@@ -81,6 +81,7 @@ def _again(request: Request, earlier: Earlier, route: str) -> Response:
     reply = earlier.reply
     if reply is None:
         assert earlier.result_id is not None, "what changed nothing is not kept"
-        made = request.app.state.made[route](agent_of(request), earlier.result_id)
+        app = running(request)
+        made = app.made[route](app.agent, earlier.result_id)
         reply = Reply(200, "application/json", made.model_dump_json(by_alias=True).encode())
     return Response(reply.body, reply.status, {REPEATED: "true"}, reply.media_type)

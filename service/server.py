@@ -12,6 +12,8 @@ import time
 import uvicorn
 from fastapi import FastAPI
 
+from service.state import Running
+
 GRACE_S = 10
 """For answers to go out, once what was worked on is finished."""
 POLL_S = 0.05
@@ -48,10 +50,10 @@ class Server(uvicorn.Server):
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         """Uvicorn's, which cancels what takes longer than the grace; so work comes first."""
-        state = self._app.state
-        state.work.stop()
-        state.agent.events.close()
-        while state.work.running and not self.force_exit:
+        app: Running = self._app.state.running
+        app.work.stop()
+        app.agent.events.close()
+        while app.work.running and not self.force_exit:
             await asyncio.sleep(POLL_S)
         await super().shutdown(sockets)
 
@@ -60,14 +62,14 @@ class Server(uvicorn.Server):
 
         A pass that hangs is waited for while something else writes: that will be answered.
         """
-        state = self._app.state
+        app: Running = self._app.state.running
         watched = (
-            ("a pass of the backbone has run", 0.0 if state.work.writing else state.agent.backbone.pass_s(), 2),
-            ("all workers have been held by requests that were given up", state.work.stuck_s() or 0.0, 1),
-            ("a write has gone on after its deadline", state.work.late_write_s(), WRITE_DEADLINES),
+            ("a pass of the backbone has run", 0.0 if app.work.writing else app.agent.backbone.pass_s(), 2),
+            ("all workers have been held by requests that were given up", app.work.stuck_s() or 0.0, 1),
+            ("a write has gone on after its deadline", app.work.late_write_s(), WRITE_DEADLINES),
             ("the event loop has stood still", self._still_s, WRITE_DEADLINES),
         )
-        deadline_s = state.settings.deadline_s
+        deadline_s = app.settings.deadline_s
         return next((f"{what} for {seconds:.0f} s" for what, seconds, times in watched if seconds > times * deadline_s), None)
 
     def _watch(self) -> None:

@@ -2,30 +2,46 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from pydantic import BaseModel
 from starlette.requests import HTTPConnection
 
+from core.warm import WarmConfig
 from service.agent import Agent
-from service.auth import Caller
+from service.auth import Caller, Guard
+from service.console.demo import Demo
 from service.metrics import Metrics
 from service.settings import Settings
+from service.work import WorkQueue
+
+Made = Mapping[str, Callable[[Agent, str], BaseModel]]
+"""By the path of a route: what it answers, from the id of what a request made."""
 
 
-def agent_of(connection: HTTPConnection) -> Agent:
-    """The application's."""
-    agent: Agent = connection.app.state.agent
-    return agent
+@dataclass(frozen=True, eq=False)
+class Running:
+    """From the start of an application to its end."""
+
+    settings: Settings
+    metrics: Metrics
+    agent: Agent
+    guard: Guard
+    work: WorkQueue
+    demo: Demo
+    made: Made
+    """What a repeated request is answered with where its first answer was lost."""
+    tracks: set[HTTPConnection]
+    """Each follows an object."""
+    warm: WarmConfig
+    """How objects are followed."""
 
 
-def settings_of(connection: HTTPConnection) -> Settings:
-    """The application's."""
-    settings: Settings = connection.app.state.settings
-    return settings
-
-
-def metrics_of(connection: HTTPConnection) -> Metrics:
-    """The application's."""
-    metrics: Metrics = connection.app.state.metrics
-    return metrics
+def running(connection: HTTPConnection) -> Running:
+    """Of the application that is asked."""
+    found: Running = connection.app.state.running
+    return found
 
 
 def caller_of(connection: HTTPConnection) -> Caller:

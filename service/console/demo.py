@@ -70,7 +70,7 @@ class Demo:
             arguments = ["simulate", str(folder / "script.yaml"), "--url", address, "--out", str(folder)]
             with (folder / "log").open("wb") as log:
                 self._process = subprocess.Popen(
-                    [sys.executable, "-m", "clients.cli", *arguments],
+                    [sys.executable, "-m", "clients.cli", *arguments],  # by its name: the service imports nothing of a robot
                     stdin=subprocess.DEVNULL,
                     stdout=log,
                     stderr=subprocess.STDOUT,

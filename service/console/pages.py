@@ -14,10 +14,11 @@ from fastapi.responses import HTMLResponse, RedirectResponse
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from core.errors import OneLookError
-from service.auth import Answering, Caller, GuardedRoute
+from service.auth import Caller
 from service.console.assets import asset_url
 from service.console.words import FILTERS
 from service.errors import problem_of, validation_problem
+from service.guarded import Answering, GuardedRoute
 from service.refusals import NoKey
 from service.schemas.problem import Problem
 

@@ -8,54 +8,49 @@ from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse
 
 from core.errors import Unavailable
+from service.auth import Caller
 from service.console.demo import OBJECTS, Demo
 from service.console.pages import Page, render
-from service.deps import AgentDep, CallerDep, SettingsDep
-from service.state import caller_of
+from service.deps import AgentDep, CallerDep, DemoDep, SettingsDep
 
 router = APIRouter(prefix="/try", route_class=Page, include_in_schema=False)
 
 
 @router.get("")
-def trying(request: Request, agent: AgentDep, settings: SettingsDep, caller: CallerDep) -> HTMLResponse:
+def trying(request: Request, agent: AgentDep, settings: SettingsDep, caller: CallerDep, episode: DemoDep) -> HTMLResponse:
     """Asks for files."""
     return render(
         request,
         "try.html",
         most_views=settings.max_views,
         may_observe=caller.may_call("observe"),
-        **_demo(request, bool(agent.memory.categories.all())),
+        **_told(episode, caller, bool(agent.memory.categories.all())),
     )
 
 
 @router.get("/demo")
-def demo(request: Request, agent: AgentDep) -> HTMLResponse:
+def demo(request: Request, agent: AgentDep, caller: CallerDep, episode: DemoDep) -> HTMLResponse:
     """How far the episode is."""
-    return render(request, "demo.html", **_demo(request, bool(agent.memory.categories.all())))
+    return render(request, "demo.html", **_told(episode, caller, bool(agent.memory.categories.all())))
 
 
 @router.post("/demo")
-def demo_start(request: Request, agent: AgentDep, caller: CallerDep) -> HTMLResponse:
+def demo_start(request: Request, agent: AgentDep, caller: CallerDep, episode: DemoDep) -> HTMLResponse:
     """Begins one."""
-    _of(request).start(agent.memory, _own_address(request), actor=caller.as_actor("console"))
-    return render(request, "demo.html", **_demo(request, False))
+    episode.start(agent.memory, _own_address(request), actor=caller.as_actor("console"))
+    return render(request, "demo.html", **_told(episode, caller, False))
 
 
 @router.post("/demo/stop")
-def demo_stop(request: Request, agent: AgentDep) -> HTMLResponse:
+def demo_stop(request: Request, agent: AgentDep, caller: CallerDep, episode: DemoDep) -> HTMLResponse:
     """Ends it."""
-    _of(request).stop()
-    return render(request, "demo.html", **_demo(request, bool(agent.memory.categories.all())))
+    episode.stop()
+    return render(request, "demo.html", **_told(episode, caller, bool(agent.memory.categories.all())))
 
 
-def _of(request: Request) -> Demo:
-    demo: Demo = request.app.state.demo
-    return demo
-
-
-def _demo(request: Request, taught: bool) -> dict[str, Any]:
-    may_demo = caller_of(request).may_call("console_demo_start")
-    return {"demo": _of(request).state(), "objects": OBJECTS, "taught": taught, "may_demo": may_demo}
+def _told(episode: Demo, caller: Caller, taught: bool) -> dict[str, Any]:
+    may_demo = caller.may_call("console_demo_start")
+    return {"demo": episode.state(), "objects": OBJECTS, "taught": taught, "may_demo": may_demo}
 
 
 def _own_address(request: Request) -> str:

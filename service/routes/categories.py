@@ -9,8 +9,8 @@ from fastapi import APIRouter, Path, Response
 from service.deps import ActorDep, AgentDep, WorkDep
 from service.exchange import MemoryRoute
 from service.gallery import CategoryGallery
+from service.routes.answers import category
 from service.routes.png import PNG_RESPONSES, Side, png
-from service.routes.scans import category
 from service.schemas.categories import (
     Category,
     CategoryList,

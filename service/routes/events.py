@@ -8,8 +8,8 @@ from typing import Annotated
 from fastapi import APIRouter, Header, Query
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 
-from service.auth import GuardedRoute
 from service.deps import AgentDep
+from service.guarded import GuardedRoute
 from service.schemas.problem import problems
 
 router = APIRouter(tags=["memory"], route_class=GuardedRoute)

@@ -7,9 +7,9 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Query
 
-from service.agent import Agent
 from service.deps import AgentDep, Source, WorkDep, read_source
 from service.exchange import MemoryRoute
+from service.routes.answers import goal
 from service.schemas.bursts import burst_or
 from service.schemas.goals import Goal, GoalList, GoalQuery, Plan, PlanQuery, Seen
 from service.schemas.problem import problems
@@ -17,14 +17,6 @@ from service.schemas.problem import problems
 router = APIRouter(tags=["goals"], route_class=MemoryRoute)
 BODY: dict[str, Any] = burst_or("Seen")
 
-
-def goal(agent: Agent, goal_id: str) -> Goal:
-    """As JSON."""
-    return Goal.of(agent.memory.goals.get(goal_id))
-
-
-MADE = {"/v1/categories/{category_id}/goals": goal}
-"""What a repeated request is answered with where its first answer was lost."""
 
 SourceDep = Annotated[Callable[[], Source], Depends(read_source(Seen))]
 
@@ -74,3 +66,7 @@ async def plan(goal_id: str, source: SourceDep, query: Annotated[PlanQuery, Quer
         return Plan.of(agent.rearranging.plan(goal_id, sent.burst_or_id, anchor=query.anchor, up=up, frame=sent.frame))
 
     return await work.run(planned)
+
+
+MADE = {"/v1/categories/{category_id}/goals": goal}
+"""What a repeated request is answered with where its first answer was lost."""

@@ -7,11 +7,12 @@ from importlib.metadata import version
 from fastapi import APIRouter, Request, Response
 
 from core.errors import OneLookError, Unavailable
-from service.auth import GuardedRoute
 from service.batching import HANGS
 from service.deps import AgentDep, MetricsDep
+from service.guarded import GuardedRoute
 from service.schemas.info import Health, Info
 from service.schemas.problem import problems
+from service.state import running
 
 router = APIRouter(tags=["operations"], route_class=GuardedRoute)
 
@@ -31,7 +32,7 @@ def readyz(request: Request, agent: AgentDep) -> Health:
             part.require_sound()
         except OneLookError as error:
             wrong.append(str(error))
-    stuck_s = request.app.state.work.stuck_s()
+    stuck_s = running(request).work.stuck_s()
     if stuck_s is not None:
         wrong.append(f"all workers have been held for {stuck_s:.0f} s by requests that were given up (ONELOOK_DEADLINE_S); {HANGS}")
     if wrong:

@@ -6,14 +6,16 @@ from fastapi import FastAPI
 
 from service import openapi
 from service.routes import categories, events, goals, health, memory, observations, scans, track
+from service.state import Made
 
 ENDPOINTS = (observations, scans, categories, goals, memory, events, track, health)
 ROUTERS = (*(each.router for each in ENDPOINTS), memory.live)
+MADE: Made = {path: made for each in ENDPOINTS for path, made in getattr(each, "MADE", {}).items()}
+"""Of all of them: what a repeated request is answered with where its first answer was lost."""
 
 
 def install(app: FastAPI) -> None:
-    """All of them, their document, and what a repeated request is answered with where its first answer was lost (`MADE`)."""
+    """All of them, and their document."""
     for router in ROUTERS:
         app.include_router(router)
     openapi.install(app, [route for router in ROUTERS for route in router.routes])
-    app.state.made = {path: made for each in ENDPOINTS for path, made in getattr(each, "MADE", {}).items()}

@@ -11,9 +11,9 @@ from fastapi.responses import FileResponse
 from starlette.exceptions import HTTPException
 
 from service.agent import Agent
-from service.auth import GuardedRoute
 from service.deps import ActorDep, AgentDep, SettingsDep, WorkDep
 from service.exchange import MemoryRoute
+from service.guarded import GuardedRoute
 from service.limits import media_type
 from service.schemas.memory import AuditEntry, AuditList, Backup, Calibrate, ExportQuery, Import, MemoryInfo, Thresholds
 from service.schemas.problem import problems

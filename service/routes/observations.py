@@ -12,12 +12,11 @@ from core.views import Burst
 from service.agent import Agent
 from service.deps import ActorDep, AgentDep, UploadDep, WorkDep
 from service.exchange import MemoryRoute
-from service.features import pose_details_from_arrays
 from service.gallery import ObservationGallery
+from service.routes.answers import observation, observation_answer
 from service.routes.png import PNG_RESPONSES, Side, png
-from service.routes.scans import scan_answer
 from service.schemas.bursts import BURST_BODY
-from service.schemas.observations import AnswerQuery, Correction, Debug, NewObservationQuery, Observation, ObservationList
+from service.schemas.observations import AnswerQuery, Correction, NewObservationQuery, Observation, ObservationList
 from service.schemas.problem import problems
 from service.schemas.vision_msgs import Detection3DArray
 from store import records
@@ -51,7 +50,7 @@ def list_observations(
 ) -> ObservationList:
     """The latest observations, newest first."""
     found = agent.memory.observations.latest(limit, before=before, category_id=category_id, outcome=outcome)
-    return ObservationList(observations=[_as_json(agent, seen) for seen in found])
+    return ObservationList(observations=[observation_answer(agent, seen) for seen in found])
 
 
 @router.get("/{observation_id}", responses=problems(404, 422))
@@ -64,7 +63,7 @@ def get_observation(observation_id: str, query: Annotated[AnswerQuery, Query()],
 async def correct_observation(observation_id: str, correction: Correction, agent: AgentDep, work: WorkDep, actor: ActorDep) -> Observation:
     """Says what it was really of: its burst joins that category and leaves the one it had joined; null makes a new one of its views."""
     said = correction.category_id, correction.name
-    return await work.run(lambda: _as_json(agent, agent.curation.correct(observation_id, *said, actor=actor)))
+    return await work.run(lambda: observation_answer(agent, agent.curation.correct(observation_id, *said, actor=actor)))
 
 
 @router.get("/{observation_id}/rgb.png", response_class=Response, responses=PNG_RESPONSES)
@@ -110,26 +109,11 @@ def _first_views(burst: Burst, count: int | None) -> Burst:
     return burst.select(range(count))
 
 
-def observation(agent: Agent, observation_id: str) -> Observation:
-    """As JSON."""
-    return _as_json(agent, agent.memory.observations.get(observation_id))
+def _as_asked(agent: Agent, seen: records.Observation, query: AnswerQuery) -> Shown:
+    if query.format == "vision_msgs":
+        return Detection3DArray.of(seen, agent.names())
+    return observation_answer(agent, seen, debug="debug" in query.include)
 
 
 MADE = {"/v1/observations": observation, "/v1/observations/{observation_id}/correct": observation}
 """What a repeated request is answered with where its first answer was lost."""
-
-
-def _as_asked(agent: Agent, seen: records.Observation, query: AnswerQuery) -> Shown:
-    if query.format == "vision_msgs":
-        return Detection3DArray.of(seen, agent.names())
-    return _as_json(agent, seen, debug="debug" in query.include)
-
-
-def _as_json(agent: Agent, seen: records.Observation, *, debug: bool = False) -> Observation:
-    scan = scan_answer(agent, agent.memory.scans.get(seen.scan_id)) if seen.scan_id else None
-    return Observation.of(seen, agent.names(), scan, _debug(agent, seen.id) if debug else None)
-
-
-def _debug(agent: Agent, observation_id: str) -> Debug | None:
-    details = pose_details_from_arrays(agent.memory.observations.features(observation_id))
-    return Debug(view_similarity=details.view_similarity.tolist(), pairs=list(details.pairs)) if details else None

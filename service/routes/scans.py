@@ -7,15 +7,13 @@ from typing import Annotated
 
 from fastapi import APIRouter, Depends, Query
 
-from core.reference import MIN_VIEWS
-from service.agent import Agent
 from service.deps import ActorDep, AgentDep, Source, UploadDep, WorkDep, read_source
 from service.exchange import MemoryRoute
+from service.routes.answers import category, scan, scan_answer
 from service.schemas.bursts import BURST_BODY, burst_or
 from service.schemas.categories import Category
 from service.schemas.problem import problems
 from service.schemas.scans import Scan, ScanBegin, ScanComplete, ScanExclude, ScanList, ScanQuery
-from store import records
 
 router = APIRouter(prefix="/v1/scans", tags=["scans"], route_class=MemoryRoute)
 
@@ -67,21 +65,6 @@ async def complete_scan(scan_id: str, agent: AgentDep, work: WorkDep, actor: Act
     """Makes the scan's views a category, in one step."""
     name = complete.name if complete else None
     return await work.run(lambda: Category.of(agent.scanning.complete(scan_id, name, actor=actor)))
-
-
-def scan_answer(agent: Agent, found: records.Scan) -> Scan:
-    """As JSON."""
-    return Scan.of(found, agent.scanning.progress(found), views_required=MIN_VIEWS)
-
-
-def scan(agent: Agent, scan_id: str) -> Scan:
-    """One by its id, as JSON."""
-    return scan_answer(agent, agent.memory.scans.get(scan_id))
-
-
-def category(agent: Agent, category_id: str) -> Category:
-    """One by its id, as JSON."""
-    return Category.of(agent.memory.categories.get(category_id))
 
 
 MADE = {

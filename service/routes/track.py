@@ -15,11 +15,11 @@ from starlette.websockets import WebSocketState
 from core.errors import OneLookError, Unavailable
 from core.warm import WarmConfig
 from service.agent import Agent
-from service.auth import admit_socket
 from service.errors import problem_of, validation_problem
+from service.guarded import admit_socket
 from service.refusals import Busy
 from service.schemas.tracking import Announcement, Dropped, FrameAnswer, FrameMessage, Hello, Ready, TrackProblem
-from service.settings import Settings
+from service.state import running
 from service.tracker import Tracker
 from service.work import WorkQueue
 
@@ -72,21 +72,20 @@ class Waiting:
 async def track(socket: WebSocket) -> None:
     """Follows one object through frames; docs/http.md tells the messages."""
     await socket.accept()
-    state = socket.app.state
-    settings: Settings = state.settings
-    if state.tracks >= settings.max_tracks:
-        error = Unavailable(f"{state.tracks} objects are followed already (ONELOOK_MAX_TRACKS); end one, or try again later")
+    app = running(socket)
+    if len(app.tracks) >= app.settings.max_tracks:
+        error = Unavailable(f"{len(app.tracks)} objects are followed already (ONELOOK_MAX_TRACKS); end one, or try again later")
         await _refuse(socket, error, status.WS_1013_TRY_AGAIN_LATER)
         return
-    state.tracks += 1
+    app.tracks.add(socket)
     try:
-        tracker = await _greet(socket, state.agent, state.warm)
+        tracker = await _greet(socket, app.agent, app.warm)
         if tracker is not None:
-            await _follow(socket, tracker, state.agent, state.work)
+            await _follow(socket, tracker, app.agent, app.work)
     except WebSocketDisconnect:
         pass
     finally:
-        state.tracks -= 1
+        app.tracks.discard(socket)
 
 
 async def _greet(socket: WebSocket, agent: Agent, warm: WarmConfig) -> Tracker | None:

@@ -9,11 +9,9 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from core.scores import SCORES
 from service.curation import Similarities
+from service.schemas.fields import CreatedAt, Name
 from service.schemas.geometry import Vector3
-from service.schemas.times import CreatedAt
 from store import records
-
-Name = Field(None, min_length=1, max_length=200, description="What people call it; null where nobody said.", examples=["cup"])
 
 
 class Category(BaseModel):

@@ -6,8 +6,8 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from core.rearrange import Anchor
 from service import goals
+from service.schemas.fields import CreatedAt
 from service.schemas.geometry import Direction, Matrix4, Rigid, Similarity, as_up
-from service.schemas.times import CreatedAt
 from store import records
 
 ANCHOR = (

@@ -6,6 +6,8 @@ from typing import Literal
 
 from pydantic import BaseModel, Field
 
+from service.schemas.fields import FalseKnownRate, Score, Threshold
+
 
 class Health(BaseModel):
     """An answer to a probe."""
@@ -19,9 +21,9 @@ class Info(BaseModel):
     version: str = Field(description="Of the distribution `onelook`.", examples=["0.1.0"])
     backbone: str = Field(examples=["dinov2-s14"])
     fingerprint: str = Field(description="Of the backbone's weights, layer and preprocessing; the memory is tied to it.")
-    score: str = Field(description="How similar two bursts are, for the decision.")
-    threshold: float | None = Field(description="Least similarity of a known object; null where the score or the rate decides.")
-    false_known_rate: float = Field(description="Of objects of no known category, the share that may be called known.", examples=[0.01])
+    score: Score
+    threshold: Threshold
+    false_known_rate: FalseKnownRate
     variant: str = Field(description="Variant of the pose pipeline, where a request names none.", examples=["ucd"])
     categories: int = Field(description="In the memory.")
     memory_version: int = Field(description="Grows with each change of the memory.")

@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from service import upkeep
 from service.agent import Agent
 from service.schemas.categories import Category
-from service.schemas.times import CreatedAt
+from service.schemas.fields import CreatedAt, FalseKnownRate, Score, Threshold
 from store import backup, records
 
 
@@ -20,9 +20,9 @@ class MemoryInfo(BaseModel):
     version: int = Field(description="Grows with each change; the ETag of reads.", examples=[42])
     backbone: str | None = Field(examples=["dinov2-s14"])
     fingerprint: str | None = Field(description="Of the backbone's weights, layer and preprocessing.")
-    score: str = Field(description="How similar two bursts are, for the decision.")
-    threshold: float | None = Field(description="Least similarity of a known object; null where the score or the rate decides.")
-    false_known_rate: float = Field(description="Of objects of no known category, the share that may be called known.", examples=[0.01])
+    score: Score
+    threshold: Threshold
+    false_known_rate: FalseKnownRate
     categories: int
     instances: int = Field(description="Bursts assigned to categories.")
     observations: int = Field(description="Kept ones.")

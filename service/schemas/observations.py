@@ -18,9 +18,9 @@ from core.sim3 import Sim3
 from core.views import FloatArray
 from service.agent import ObserveOptions
 from service.schemas import scans
+from service.schemas.fields import CreatedAt
 from service.schemas.geometry import Box, Direction, Matrix4, Quaternion, Similarity, Stretch, as_up
 from service.schemas.quality import Grounds
-from service.schemas.times import CreatedAt
 from store import records
 
 PixelBox = Annotated[list[float], Field(min_length=4, max_length=4)]

@@ -10,10 +10,9 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from core.scan import ScanOptions, UpSource
 from service.scanning import Progress
-from service.schemas.categories import Name
+from service.schemas.fields import CreatedAt, Name
 from service.schemas.geometry import Direction, Matrix4, Vector3, as_up
 from service.schemas.quality import Fault
-from service.schemas.times import CreatedAt
 from store import records
 
 MOST_VIEWPOINTS = 64

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from types import SimpleNamespace
 
 import numpy as np
 from fastapi import FastAPI, Request
@@ -69,7 +70,7 @@ def hello(content: bytes) -> None:
 def multipart(content: bytes) -> None:
     """A whole body; its boundary is `xx`."""
     app = FastAPI()
-    app.state.settings = Settings(max_views=4)
+    app.state.running = SimpleNamespace(settings=Settings(max_views=4))
     scope = {
         "type": "http",
         "method": "POST",

@@ -168,7 +168,7 @@ def test_what_has_an_end_is_ended_while_the_service_runs(settings, backbone, loo
     monkeypatch.setattr(service.app, "PRUNE_EVERY_S", 0.02)
     with TestClient(create_app(settings.model_copy(update={"scan_expiry_h": 1e-6}), backbone=backbone)) as client:
         client.post("/v1/scans", files=parts(look()))
-        rows = client.app.state.agent.memory._connection.rows
+        rows = client.app.state.running.agent.memory._connection.rows
         for _ in range(200):
             if rows("SELECT state FROM scans") == [{"state": "expired"}]:
                 return

@@ -60,7 +60,7 @@ def headers(guarded: Any) -> dict[str, dict[str, str]]:
 
 def guarded_memory(client: TestClient) -> Memory:
     """Of the service that `client` asks."""
-    return client.app.state.agent.memory
+    return client.app.state.running.agent.memory
 
 
 def expected(operation: str) -> str | None:

@@ -9,7 +9,7 @@ from fastapi.testclient import TestClient
 
 from service.app import create_app
 from service.exchange import MemoryRoute
-from service.routes.install import ROUTERS
+from service.routes.install import MADE, ROUTERS
 
 KEY = {"Idempotency-Key": "4f1c"}
 
@@ -20,7 +20,7 @@ def observations(client):
 
 def lose_answers(client):
     """As if the process had ended between what it did and what it said."""
-    with client.app.state.agent.memory._connection.housekeeping() as db:
+    with client.app.state.running.agent.memory._connection.housekeeping() as db:
         db.execute("UPDATE requests SET status = NULL, media_type = NULL, body = NULL")
 
 
@@ -89,12 +89,12 @@ def test_an_answer_lost_with_the_process_is_made_again_from_what_was_kept(client
     assert len(observations(client)) == 1
 
 
-def test_whatever_is_made_can_be_answered_again(client):
+def test_whatever_is_made_can_be_answered_again():
     made = {
         route.path_format for router in ROUTERS for route in router.routes if isinstance(route, MemoryRoute) and route.status_code == 201
     }
     assert "/v1/observations" in made
-    assert made <= set(client.app.state.made)
+    assert made <= set(MADE)
 
 
 def test_a_plan_lost_with_the_process_is_made_anew_once(client, learn, look, parts):
@@ -108,7 +108,7 @@ def test_a_plan_lost_with_the_process_is_made_anew_once(client, learn, look, par
 
 
 def test_a_goal_whose_process_ended_after_its_observation_is_made_at_the_repetition(client, ball, look, parts, monkeypatch):
-    path, goals = f"/v1/categories/{ball['id']}/goals", client.app.state.agent.memory.goals
+    path, goals = f"/v1/categories/{ball['id']}/goals", client.app.state.running.agent.memory.goals
 
     def ended(*about, **more):
         raise RuntimeError

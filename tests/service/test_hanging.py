@@ -92,10 +92,10 @@ def test_a_disk_that_hangs_ends_the_process(tmp_path: Path, look: Any, parts: An
 def test_what_hangs_had_a_second_deadline_and_what_may_be_a_slow_disk_ten(found: dict[str, Any], said: str | None) -> None:
     figures = {"pass_s": 0.0, "stuck_s": None, "late_write_s": 0.0, "writing": False} | found
     app = FastAPI()
-    app.state.settings = SimpleNamespace(deadline_s=1.0)
-    app.state.agent = SimpleNamespace(backbone=SimpleNamespace(pass_s=lambda: figures["pass_s"]))
-    app.state.work = SimpleNamespace(
-        stuck_s=lambda: figures["stuck_s"], late_write_s=lambda: figures["late_write_s"], writing=figures["writing"]
+    app.state.running = SimpleNamespace(
+        settings=SimpleNamespace(deadline_s=1.0),
+        agent=SimpleNamespace(backbone=SimpleNamespace(pass_s=lambda: figures["pass_s"])),
+        work=SimpleNamespace(stuck_s=lambda: figures["stuck_s"], late_write_s=lambda: figures["late_write_s"], writing=figures["writing"]),
     )
     hanging = Server(app).hanging()
     assert hanging is None if said is None else said in (hanging or "")

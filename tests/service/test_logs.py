@@ -54,7 +54,7 @@ def test_an_observation_is_told_with_its_request_and_its_robot(client, look, par
 
 def test_the_robot_is_the_key_before_what_it_says(settings, backbone, written):
     with TestClient(create_app(settings, backbone=backbone)) as client:
-        key = client.app.state.agent.memory.keys.create("arm", "robot")[1]
+        key = client.app.state.running.agent.memory.keys.create("arm", "robot")[1]
         log = written()
         client.get("/v1/info", headers={"Authorization": f"Bearer {key}", "X-Actor": "left"})
         client.get("/v1/info")
@@ -123,7 +123,7 @@ def test_what_the_service_lacks_is_a_warning(client, look, parts, written, monke
     def full(*args, **options):
         raise Unavailable("the disk is full")
 
-    monkeypatch.setattr(client.app.state.agent.memory.observations, "create", full)
+    monkeypatch.setattr(client.app.state.running.agent.memory.observations, "create", full)
     log = written()
     assert client.post("/v1/observations", files=parts(look())).status_code == 503
     warned = lines(log)[0]

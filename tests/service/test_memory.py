@@ -76,7 +76,7 @@ def test_names_that_two_have_are_told(client, other, look, parts, ball):
 def test_a_repeated_import_is_done_once_even_if_its_answer_was_lost(client, other, ball):
     archive, headers = client.post("/v1/memory/export").content, ZIP | {"Idempotency-Key": "i1"}
     first = other.post("/v1/memory/import", content=archive, headers=headers).json()
-    with other.app.state.agent.memory._connection.housekeeping() as db:
+    with other.app.state.running.agent.memory._connection.housekeeping() as db:
         db.execute("UPDATE requests SET status = NULL, media_type = NULL, body = NULL")
     assert other.post("/v1/memory/import", content=archive, headers=headers).json() == first
 

@@ -69,7 +69,7 @@ def test_only_the_first_views_are_used(client, look, parts):
 def test_a_known_object_joins_its_category(client, look, parts, ball):
     seen = client.post("/v1/observations", files=parts(look(views=3))).json()
     assert client.get(f"/v1/categories/{ball['id']}").json()["instances"] == 2
-    joined = client.app.state.agent.memory.instances.members()[-1]
+    joined = client.app.state.running.agent.memory.instances.members()[-1]
     assert (joined.category_id, len(joined.cls)) == (seen["category_id"], 3)
 
 
@@ -110,7 +110,7 @@ def test_correspondences_join_two_crops(client, seen):
 
 
 def test_the_best_view_is_where_most_correspondences_agree(client, seen):
-    arrays = client.app.state.agent.memory.observations.features(seen["id"])
+    arrays = client.app.state.running.agent.memory.observations.features(seen["id"])
     inliers = np.bincount(arrays["match_target_view"][arrays["match_inlier"]], minlength=4)
     assert inliers[seen["pose"]["best_view"]] == inliers.max()
     path = f"/v1/observations/{seen['id']}/correspondences.png"
@@ -257,7 +257,7 @@ def test_a_novel_object_is_no_detection(client, look, parts):
 @pytest.mark.parametrize("moment", ["reference", "create"])
 def test_what_is_deleted_while_it_is_decided_for_is_decided_anew(client, look, parts, ball, monkeypatch, moment):
     """Before its reference is read, or after, before the answer is kept."""
-    memory = client.app.state.agent.memory
+    memory = client.app.state.running.agent.memory
     place = memory.categories if moment == "reference" else memory.observations
     kept = getattr(place, moment)
 
@@ -273,7 +273,7 @@ def test_what_is_deleted_while_it_is_decided_for_is_decided_anew(client, look, p
 
 
 def test_a_category_that_the_caller_names_is_not_decided_anew(client, look, parts, ball, monkeypatch):
-    memory = client.app.state.agent.memory
+    memory = client.app.state.running.agent.memory
     kept = memory.categories.reference
 
     def deleted_first(category_id):

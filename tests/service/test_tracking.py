@@ -258,7 +258,7 @@ def test_an_object_that_jumped_is_sought_anew(track, ball, camera_round, solves)
 
 
 def test_what_is_followed_for_long_is_sought_anew(client, track, ball, camera_round, solves):
-    client.app.state.warm = SOUGHT_EACH_FRAME
+    client.app.state.running = replace(client.app.state.running, warm=SOUGHT_EACH_FRAME)
     track([message(*each) for each in enumerate(camera_round(PLACED, 5))], category_id=ball["id"], window=2)
     assert len(solves) == 5
 
@@ -274,7 +274,7 @@ def test_a_solve_that_lays_the_object_on_worse_than_the_last_pose_is_not_believe
         return found if count[0] < 3 else replace(found, target_from_reference=found.target_from_reference @ upside_down)
 
     monkeypatch.setattr(tracker.PoseEstimator, "estimate", misled)
-    client.app.state.warm = SOUGHT_EACH_FRAME
+    client.app.state.running = replace(client.app.state.running, warm=SOUGHT_EACH_FRAME)
     answers = track([message(*each) for each in enumerate(camera_round(PLACED, 9))], category_id=ball["id"], window=3)
     assert count == [9]
     last = answers[-1]["pose"]["target_from_reference"]

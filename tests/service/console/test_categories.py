@@ -252,7 +252,7 @@ def test_bars_are_as_long_as_their_share_of_the_longest():
 @pytest.fixture
 def crowded(client, cup):
     """The service once it knows 500 categories and 10,000 observations: copies of the rows of one."""
-    with client.app.state.agent.memory._connection.change() as db:
+    with client.app.state.running.agent.memory._connection.change() as db:
         for table, count in (("categories", MANY - 2), ("observations", OBSERVATIONS), ("instances", 2 * MANY)):
             own = "name" if table == "categories" else "category_id"
             copied = [column.name for column in db.table(table).columns if column.name not in {"id", own}]
@@ -280,6 +280,6 @@ def test_a_crowded_memory_is_asked_little(crowded, monkeypatch):
         assert answer.status_code == 200
         assert len(asked) <= 3
         for sql, parameters in list(asked):
-            plan = rows(crowded.app.state.agent.memory._connection, f"EXPLAIN QUERY PLAN {sql}", *parameters)
+            plan = rows(crowded.app.state.running.agent.memory._connection, f"EXPLAIN QUERY PLAN {sql}", *parameters)
             assert not [step["detail"] for step in plan if re.match("SCAN (o|observations|i|instances)\\b", step["detail"])]
     assert f"{MANY} categories, page 1 of 11" in crowded.get("/categories").text

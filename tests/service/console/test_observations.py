@@ -79,7 +79,7 @@ def test_images_alone_are_enough_for_a_page(client, ball, look, parts):
 
 
 def test_where_to_look_next_is_told(client, ball, look, parts, monkeypatch):
-    agent = client.app.state.agent
+    agent = client.app.state.running.agent
     seen = client.post("/v1/observations", files=parts(look(views=2)), params={"threshold": 2.0}).json()
     found = agent.memory.observations.get(seen["id"])
     kept = replace(found, outcome="uncertain", viewpoints=np.eye(4)[None])
@@ -127,7 +127,7 @@ def test_stages_fill_the_bar():
 
 
 def test_the_reference_is_moved_as_the_pose_says(client, ball, seen):
-    agent = client.app.state.agent
+    agent = client.app.state.running.agent
     pose = agent.memory.observations.get(seen["id"]).pose
     reference = agent.memory.categories.reference(ball["id"])
     np.testing.assert_allclose(moved(pose, reference), pose.target_from_reference.apply(reference.cloud_m))

@@ -39,7 +39,7 @@ def episode():
 
 
 def test_a_robot_is_pointed_at_this_service(client, begun, episode):
-    memory = client.app.state.agent.memory
+    memory = client.app.state.running.agent.memory
     episode.start(memory, "http://127.0.0.1:8000")
     ((arguments, environment),) = begun
     assert arguments[3] == "simulate"
@@ -49,7 +49,7 @@ def test_a_robot_is_pointed_at_this_service(client, begun, episode):
 
 
 def test_one_at_a_time(client, begun, episode):
-    memory = client.app.state.agent.memory
+    memory = client.app.state.running.agent.memory
     episode.start(memory, "http://x")
     with pytest.raises(Conflict, match="runs already"):
         episode.start(memory, "http://x")
@@ -60,7 +60,7 @@ def test_one_at_a_time(client, begun, episode):
 
 def test_nothing_is_taught_among_what_was_learnt(client, begun, episode, ball):
     with pytest.raises(Conflict, match="the memory is not empty"):
-        episode.start(client.app.state.agent.memory, "http://x")
+        episode.start(client.app.state.running.agent.memory, "http://x")
     assert begun == []
     assert "It needs an empty memory" in client.get("/try").text
 
@@ -69,14 +69,14 @@ def test_it_ends_with_the_service(settings, backbone, begun):
     app = create_app(settings, backbone=backbone)
     with TestClient(app) as service:
         assert "Stop it" in service.post("/try/demo").text
-        process = app.state.demo._process
+        process = app.state.running.demo._process
         assert process.poll() is None
     assert process.poll() is not None
 
 
 def test_it_ends_after_a_while(client, begun, episode, monkeypatch):
     monkeypatch.setattr(demo, "LIMIT_S", 0.05)
-    episode.start(client.app.state.agent.memory, "http://x")
+    episode.start(client.app.state.running.agent.memory, "http://x")
     deadline = time.monotonic() + 10
     while episode.state().running and time.monotonic() < deadline:
         time.sleep(0.02)
@@ -87,20 +87,20 @@ def test_why_it_failed_is_told(client, monkeypatch, episode):
     popen = subprocess.Popen
     failing = [sys.executable, "-c", "print('error: no world'); raise SystemExit(1)"]
     monkeypatch.setattr(demo.subprocess, "Popen", lambda arguments, **options: popen(failing, **options))
-    episode.start(client.app.state.agent.memory, "http://x")
+    episode.start(client.app.state.running.agent.memory, "http://x")
     episode._process.wait()
     assert episode.state() == demo.DemoState(False, 0, "error: no world", True)
 
 
 def test_progress_is_read_from_what_it_writes(client, begun, episode):
-    episode.start(client.app.state.agent.memory, "http://x")
+    episode.start(client.app.state.running.agent.memory, "http://x")
     with open(os.path.join(episode._folder.name, "episode.jsonl"), "w") as lines:
         lines.write('{"settings": 1}\n{"number": 1}\n{"number": 2}\n{"numb')
     assert episode.state().met == 2
 
 
 def test_where_keys_are_set_the_robot_has_one(client, begun, episode):
-    memory = client.app.state.agent.memory
+    memory = client.app.state.running.agent.memory
     memory.keys.create("anna", "admin")
     for _ in range(2):
         episode.start(memory, "http://x", actor="anna")
@@ -111,7 +111,7 @@ def test_where_keys_are_set_the_robot_has_one(client, begun, episode):
 
 
 def test_only_an_admin_begins_one_and_only_a_robot_asks(client, begun):
-    keys = client.app.state.agent.memory.keys
+    keys = client.app.state.running.agent.memory.keys
     sent = {role: {"Authorization": f"Bearer {keys.create(role, role)[1]}"} for role in ("viewer", "robot", "admin")}
     for role, shown in (("viewer", False), ("robot", True)):
         assert client.post("/try/demo", headers=sent[role]).status_code == 403
