@@ -23,7 +23,7 @@ def test_libraries_are_what_was_published(name, sha256):
 
 
 def test_a_file_named_by_its_content_is_kept_for_good(client):
-    answer = client.get(asset_url("console.css"))
+    answer = client.get(asset_url("base.css"))
     assert answer.headers["content-type"].startswith("text/css")
     assert "immutable" in answer.headers["cache-control"]
 
