@@ -27,7 +27,7 @@ class Settings(BaseSettings):
     )
     host: str = Field("127.0.0.1", description="Address to listen on; one that other machines reach takes a key (`onelook keys create`).")
     port: int = Field(8000, ge=0, le=65535, description="Port to listen on; 0 takes a free one.")
-    backbone: str = Field(EMBEDDED, description="Name of a backbone, or a folder or hub name of the DINO family.")
+    backbone: str = Field(EMBEDDED, description="Name of a backbone, such as `dinov2-s14`, or a folder or hub name of the DINO family.")
     device: str = Field("cpu", description="Torch device of the backbone: `cpu`, `cuda`, `cuda:1`.")
     score: str = Field(DEFAULT_SCORE, description="How similar two bursts are, for the decision.")
     threshold: float | None = Field(None, description="Least similarity of a known object; the score's own default where left out.")

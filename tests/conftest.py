@@ -21,7 +21,7 @@ from hypothesis import settings
 
 from core.backbones.base import Backbone, Features, shown_patches
 from core.sim3 import Sim3
-from core.views import Camera, View
+from core.views import Burst, Camera, View
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -101,6 +101,19 @@ def no_user_settings(monkeypatch: pytest.MonkeyPatch) -> None:
 def samples() -> Path:
     """The repository's recordings: real images, in the data layout."""
     return Path(__file__).parent / "data" / "bursts"
+
+
+@pytest.fixture(scope="session")
+def recorded(samples: Path) -> Callable[[str, range], Burst]:
+    """recorded(name, indices): views of a sample."""
+
+    from clients.datasets.folders import find_sequences, load_burst
+
+    def views(name: str, indices: range) -> Burst:
+        (sequence,) = find_sequences(samples / name)
+        return load_burst(sequence, indices)
+
+    return views
 
 
 @pytest.fixture

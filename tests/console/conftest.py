@@ -13,9 +13,7 @@ import pytest
 from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Browser, ConsoleMessage, Page, Request, Response, expect, sync_playwright
 
-from clients.datasets.folders import find_sequences, load_burst
 from clients.robot import RobotClient
-from core.views import Burst
 from service.settings import Settings
 
 TABLET = {"width": 1180, "height": 820}
@@ -104,17 +102,6 @@ def robot(service: str) -> Iterator[RobotClient]:
     """A client of it."""
     with RobotClient(service) as client:
         yield client
-
-
-@pytest.fixture(scope="session")
-def recorded(samples: Path) -> Callable[[str, range], Burst]:
-    """recorded(name, indices): views of a sample."""
-
-    def views(name: str, indices: range) -> Burst:
-        (sequence,) = find_sequences(samples / name)
-        return load_burst(sequence, indices)
-
-    return views
 
 
 @pytest.fixture

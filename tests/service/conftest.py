@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import io
 import json
 import shutil
@@ -11,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import cv2
+import httpx
 import numpy as np
 import pytest
 from fastapi.testclient import TestClient
@@ -80,6 +82,17 @@ def until(what: Callable[[], object]) -> None:
 def png(image: np.ndarray) -> bytes:
     """An image as a file."""
     return cv2.imencode(".png", image)[1].tobytes()
+
+
+def as_text(image: np.ndarray) -> str:
+    """An image as a message of WS /v1/track has it."""
+    return base64.b64encode(png(image)).decode()
+
+
+def picture(answer: httpx.Response) -> np.ndarray:
+    """The image of an answer, shape (H, W, 3), RGB."""
+    assert (answer.status_code, answer.headers["content-type"]) == (200, "image/png"), answer.text
+    return cv2.imdecode(np.frombuffer(answer.content, np.uint8), cv2.IMREAD_COLOR)[..., ::-1]
 
 
 @pytest.fixture(scope="session")

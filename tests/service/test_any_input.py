@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import base64
 import io
 import json
 
-import cv2
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
+
+from tests.service.conftest import as_text
 
 few = settings(max_examples=60, suppress_health_check=list(HealthCheck))
 JSON = st.recursive(
@@ -42,10 +42,6 @@ def sent(client, parts, burst, content):
     files = parts(burst)
     files[0] = ("burst", ("burst.json", content, "application/json"))
     return client.post("/v1/observations", files=files)
-
-
-def as_text(image):
-    return base64.b64encode(cv2.imencode(".png", image)[1].tobytes()).decode()
 
 
 @few

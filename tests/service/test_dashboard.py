@@ -19,7 +19,7 @@ NAME = re.compile(r"\b((?:onelook|process)_\w+)(?:\{([^}]*)\})?")
 
 
 @pytest.fixture
-def samples(client, learn, look, parts):
+def exposed(client, learn, look, parts):
     """Every sample's labels, by its name, of a service that has learnt and recognised something."""
     learn()
     client.post("/v1/observations", files=parts(look()))
@@ -32,29 +32,29 @@ def samples(client, learn, look, parts):
     return found
 
 
-def test_every_query_is_of_figures_that_there_are(samples):
+def test_every_query_is_of_figures_that_there_are(exposed):
     assert len(QUERIES) > 25
     for title, query in QUERIES:
         asked = NAME.findall(query)
         assert asked, title
         for name, selector in asked:
-            assert name in samples, f"{title}: no figure is called {name}"
+            assert name in exposed, f"{title}: no figure is called {name}"
             for label, comparison, value in re.findall(r'(\w+)(!?=)"([^"]*)"', selector):
-                values = {labels.get(label) for labels in samples[name]}
+                values = {labels.get(label) for labels in exposed[name]}
                 assert (value in values) if comparison == "=" else (None not in values), f"{title}: {selector}"
 
 
-def test_what_is_grouped_by_is_a_label(samples):
+def test_what_is_grouped_by_is_a_label(exposed):
     for title, query in QUERIES:
         (name, _) = NAME.findall(query)[0]
         for label in re.findall(r"by \(([^)]*)\)", query):
             for each in label.split(", "):
-                assert each in samples[name][0], f"{title}: {name} has no label {each}"
+                assert each in exposed[name][0], f"{title}: {name} has no label {each}"
 
 
-def test_every_figure_of_the_service_is_shown(samples):
+def test_every_figure_of_the_service_is_shown(exposed):
     shown = {name for _, query in QUERIES for name, _ in NAME.findall(query)}
-    families = {re.sub(r"_(total|bucket|sum|count|created)$", "", name) for name in samples if name.startswith("onelook_")}
+    families = {re.sub(r"_(total|bucket|sum|count|created)$", "", name) for name in exposed if name.startswith("onelook_")}
     assert families == {re.sub(r"_(total|bucket|sum|count)$", "", name) for name in shown if name.startswith("onelook_")}
 
 

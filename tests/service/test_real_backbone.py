@@ -14,7 +14,6 @@ import pytest
 from scipy.spatial.transform import Rotation
 from websockets.sync.client import connect
 
-from clients.datasets.folders import find_sequences, load_burst
 from core.sim3 import Sim3, rotation_angle_deg
 from core.views import Burst, Camera
 from service.app import create_app
@@ -44,17 +43,6 @@ def http(serving, embedded_backbone, tmp_path_factory, called):
         httpx.Client(base_url=url, timeout=120, event_hooks={"response": [note]}) as client,
     ):
         yield client
-
-
-@pytest.fixture(scope="module")
-def recorded(samples):
-    """recorded(name, indices): views of a sample."""
-
-    def views(name, indices):
-        (sequence,) = find_sequences(samples / name)
-        return load_burst(sequence, indices)
-
-    return views
 
 
 @pytest.fixture(scope="module")

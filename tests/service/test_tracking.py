@@ -8,7 +8,6 @@ import threading
 from dataclasses import replace
 
 import anyio
-import cv2
 import numpy as np
 import pytest
 from fastapi.testclient import TestClient
@@ -21,15 +20,12 @@ from core.warm import WarmConfig
 from service import tracker
 from service.app import create_app
 from service.routes.track import WAITING_FRAMES, Waiting
+from tests.service.conftest import as_text
 
 UP = np.array([0.0, 0.0, 1.0])
 PLACED = Sim3(1.0, Rotation.from_euler("z", 50, degrees=True).as_matrix(), np.array([0.3, -0.1, 0.05]))
 MOVED = Sim3(1.0, PLACED.rotation, np.array([0.8, 0.4, 0.05]))
 SOUGHT_EACH_FRAME = WarmConfig(sought_anew_after=0)
-
-
-def png(image):
-    return base64.b64encode(cv2.imencode(".png", image)[1].tobytes()).decode()
 
 
 def message(number, view, **changes):
@@ -40,8 +36,8 @@ def message(number, view, **changes):
         "time_s": number / 10,
         "K": view.camera.K.tolist(),
         "world_from_camera": view.camera.world_from_camera.tolist(),
-        "rgb": png(view.rgb[..., ::-1]),
-        "depth": png(np.round(view.depth_m * 1000).astype(np.uint16)),
+        "rgb": as_text(view.rgb[..., ::-1]),
+        "depth": as_text(np.round(view.depth_m * 1000).astype(np.uint16)),
     } | changes
 
 
@@ -120,7 +116,7 @@ def test_an_object_of_no_category_gets_no_pose(track, ball, camera_round):
 
 def test_a_lost_object_is_held_for_a_while_then_announced_and_found_again(track, ball, camera_round):
     seen = camera_round(PLACED, 3)
-    blank = [message(number, seen[0], rgb=png(np.zeros((160, 160, 3), np.uint8))) for number in (3, 4, 5)]
+    blank = [message(number, seen[0], rgb=as_text(np.zeros((160, 160, 3), np.uint8))) for number in (3, 4, 5)]
     frames = [*(message(*each) for each in enumerate(seen)), *blank, message(6, seen[0])]
     answers = track(frames, category_id=ball["id"])
     assert kinds(answers[1:]) == ["found", "pose", "pose", "pose", "pose", "pose", "lost", "pose", "found", "pose"]

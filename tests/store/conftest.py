@@ -18,11 +18,16 @@ from core.sim3 import Sim3
 from core.views import Burst, Camera, View
 from store.memory import Memory
 from store.observations import Answer
-from store.records import Category
+from store.records import AuditEntry, Category
 
 VIEWS, PATCHES, DIM = 3, 5, 8
 NOVEL, KNOWN = (Answer(outcome, None, None, None, None, None, None, {}) for outcome in ("novel", "known"))
 """Answers of which nothing else is kept."""
+
+
+def last(memory: Memory) -> AuditEntry:
+    """What was changed last."""
+    return memory.audit.latest(1)[0]
 
 
 @pytest.fixture
@@ -94,6 +99,14 @@ def category(memory: Memory, reference: Reference, burst: Burst, encoded: Encode
 def other(memory: Memory, category: Category, reference: Reference, burst: Burst, encoded: EncodedBurst) -> Category:
     """A younger one."""
     return memory.categories.create(reference, burst, encoded, name="mug")
+
+
+@pytest.fixture
+def full(memory: Memory, category: Category, other: Category, burst: Burst, request_for_views: ScanRequest) -> Memory:
+    """Two categories, an observation, and a scan with views."""
+    memory.observations.create(NOVEL, burst, {"a": np.arange(3)})
+    memory.scans.add(memory.scans.create(request_for_views).id, burst)
+    return memory
 
 
 @pytest.fixture

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from core.encode import EncodedBurst
@@ -15,15 +14,6 @@ from core.views import Burst
 from store import backup as backups
 from store.memory import Memory
 from store.records import Category
-from tests.store.conftest import NOVEL
-
-
-@pytest.fixture
-def full(memory: Memory, category: Category, other: Category, burst: Burst, request_for_views: ScanRequest) -> Memory:
-    """Two categories, an observation and a scan in progress."""
-    memory.observations.create(NOVEL, burst, {"a": np.arange(3)})
-    memory.scans.add(memory.scans.create(request_for_views).id, burst)
-    return memory
 
 
 def flip(path: Path) -> None:

@@ -13,8 +13,8 @@ from core.reference import Reference
 from core.views import Burst
 from store.memory import Memory
 from store.observations import Joins
-from store.records import AuditEntry, Category, Instance, Observation
-from tests.store.conftest import KNOWN, NOVEL
+from store.records import Category, Instance, Observation
+from tests.store.conftest import KNOWN, NOVEL, last
 
 FEATURES = {"a": np.arange(3)}
 
@@ -36,10 +36,6 @@ def assignment(memory: Memory, seen: Observation) -> Instance | None:
     """Where its burst is."""
     everywhere = [each for category in memory.categories.all() for each in memory.instances.of(category.id)]
     return next((each for each in everywhere if each.source_id == seen.id), None)
-
-
-def last(memory: Memory) -> AuditEntry:
-    return memory.audit.latest(1)[0]
 
 
 def test_an_observation_of_nothing_joins_what_is_named(memory: Memory, category: Category, unassigned: Observation, encoded) -> None:

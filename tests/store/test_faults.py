@@ -35,11 +35,9 @@ def disk(folder: Path) -> Iterator[Disk]:
 
 
 @pytest.fixture
-def filled(disk: Disk, category: Category, other: Category, memory: Memory, burst: Burst, request_for_views: ScanRequest) -> Memory:
-    """Two categories, an observation and a scan with views."""
-    memory.observations.create(NOVEL, burst, {"a": np.arange(3)})
-    memory.scans.add(memory.scans.create(request_for_views).id, burst)
-    return memory
+def filled(disk: Disk, full: Memory) -> Memory:
+    """A memory on that disk."""
+    return full
 
 
 @pytest.fixture

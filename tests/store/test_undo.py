@@ -13,12 +13,9 @@ from core.reference import Reference
 from core.sim3 import Sim3
 from core.views import Burst
 from store.memory import Memory
-from store.records import AuditEntry, Category
+from store.records import Category
 from store.retention import Retention
-
-
-def last(memory: Memory) -> AuditEntry:
-    return memory.audit.latest(1)[0]
+from tests.store.conftest import last
 
 
 def test_a_change_says_who_and_what(memory: Memory, category: Category) -> None:
