@@ -31,6 +31,10 @@ class BackboneIdentity(Protocol):
         """Raises Unavailable where it is known to fail."""
         ...
 
+    def pass_s(self) -> float:
+        """For how long a pass has run in this process; 0 where none does."""
+        ...
+
 
 @dataclass(frozen=True, eq=False)
 class CategoryReference:

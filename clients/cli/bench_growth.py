@@ -156,7 +156,7 @@ def _insert(folder: Path, bursts: Sequence[EncodedBurst]) -> None:
     """Categories as the store writes their rows, whose references and pictures are nowhere."""
     from store.connection import Connection, new_id
     from store.instances import insert_instance
-    from store.retention import now
+    from store.times import now
 
     connection = Connection(folder)
     try:

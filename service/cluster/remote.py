@@ -60,6 +60,10 @@ class RemoteBackbone:
             if not parts[name].replica_states.get(ReplicaState.RUNNING):
                 raise Unavailable(f"no {name} is running; Ray Serve starts them again, and `serve status` says why it cannot")
 
+    def pass_s(self) -> float:
+        """0: who has it watches its own passes."""
+        return 0.0
+
 
 class RemoteEncoder:
     """Asks whichever encoder has the least to do."""

@@ -68,3 +68,10 @@ def test_a_file_that_cannot_be_read_is_named(tmp_path: Path, burst: Burst) -> No
     (tmp_path / "001_rgb.png").mkdir()
     with pytest.raises(Unavailable, match=r"001_rgb\.png cannot be read"):
         read_burst(tmp_path, files)
+
+
+def test_a_file_that_is_no_picture_though_it_is_what_was_written_is_named(tmp_path: Path, burst: Burst) -> None:
+    write_burst(tmp_path, burst)
+    (tmp_path / "001_rgb.png").write_bytes(b"no picture")
+    with pytest.raises(Unavailable, match=r"001_rgb\.png is no picture"):
+        read_burst(tmp_path, sums(tmp_path))

@@ -16,11 +16,12 @@ from core.errors import Unavailable
 from core.reference import Reference
 from core.scan import ScanRequest
 from core.views import Burst
-from store import retention
+from store import times
 from store.connection import TRIAL
 from store.contents import FOLDERS
 from store.memory import Memory
 from store.records import Category
+from store.retention import Retention
 from tests.faults import Disk, failing, tapped
 from tests.store.conftest import NOVEL
 
@@ -168,7 +169,7 @@ def test_a_clock_that_jumps_takes_nothing_that_was_learnt(filled, changes, monke
         def now(cls, tz=None):
             return datetime.now(tz) + jump
 
-    monkeypatch.setattr(retention, "datetime", Jumped)
+    monkeypatch.setattr(times, "datetime", Jumped)
     changes["begin"]()
     filled.prune()
     assert [(each.id, each.name, each.instances) for each in filled.categories.all()] == known
@@ -185,7 +186,7 @@ def test_a_clock_that_jumps_takes_nothing_that_was_learnt(filled, changes, monke
 def test_a_disk_that_fails_while_old_things_are_removed_is_tidied_up_later(disk, filled, changes, burst):
     gone = filled.observations.root / filled.observations.latest(1)[0].id
     disk.fault = failing(errno.EIO, "remove")
-    filled._connection.retention = retention.Retention(observations=1)
+    filled._connection.retention = Retention(observations=1)
     with pytest.raises(OSError, match="Input/output"):
         changes["observe"]()
     disk.fault = lambda kind, path: None

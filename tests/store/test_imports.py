@@ -134,6 +134,14 @@ def test_one_changed_bit_is_noticed(second: Memory, archive: Path, tmp_path: Pat
     assert nothing_changed(second)
 
 
+def test_a_zip_file_without_a_manifest_is_refused(second: Memory, archive: Path, tmp_path: Path) -> None:
+    entries = unpacked(archive)
+    del entries["manifest.json"]
+    with pytest.raises(InvalidInput, match="onelook memory export"):
+        second.import_archive(packed(tmp_path / "evil.zip", entries))
+    assert nothing_changed(second)
+
+
 def test_a_missing_archive_is_named(second: Memory, tmp_path: Path) -> None:
     with pytest.raises(Unavailable, match=r"none\.zip"):
         second.import_archive(tmp_path / "none.zip")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from core.packing import burst_as_arrays
 from core.reference import build_reference
 from core.sim3 import Sim3
 from core.views import Burst
+from store import reembed
 from store.memory import Memory
 from store.observations import Joins
 from store.records import Category
@@ -120,6 +122,17 @@ def test_stopped_on_the_way_it_is_what_it_was(learnt: Memory, category: Category
     assert files(learnt.folder) == before
     assert learnt.fingerprint == backbone.fingerprint
     assert learnt.categories.reference(category.id).fingerprint == backbone.fingerprint
+
+
+def test_on_a_full_disk_it_is_what_it_was(learnt: Memory, other: Backbone, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(path: Path) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    before = files(learnt.folder)
+    monkeypatch.setattr(reembed, "sync", full)
+    with pytest.raises(Unavailable, match="No space left on device; free space"):
+        learnt.reembed(other)
+    assert files(learnt.folder) == before
 
 
 def test_a_category_without_its_views_stops_it_and_is_named(learnt: Memory, category: Category, other: Backbone) -> None:

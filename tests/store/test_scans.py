@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from datetime import timedelta
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from core.reference import Reference
 from core.scan import ScanRequest
 from core.views import Burst
 from store.memory import Memory
+from store.retention import Retention
 
 
 @pytest.fixture
@@ -98,6 +100,13 @@ def test_a_scan_may_ask_for_other_viewpoints(memory: Memory, request_for_views: 
 def test_a_completed_scan_asks_for_nothing_more(memory: Memory, completed: str, request_for_views: ScanRequest) -> None:
     with pytest.raises(Conflict, match="completed"):
         memory.scans.replace_request(completed, request_for_views)
+
+
+def test_an_expired_scan_takes_no_more_views(folder: Path, request_for_views: ScanRequest, burst: Burst) -> None:
+    with Memory.open(folder, Retention(scans=timedelta(0))) as memory:
+        scan = memory.scans.create(request_for_views)
+        with pytest.raises(Conflict, match="since no views came; begin another"):
+            memory.scans.add(scan.id, burst)
 
 
 def test_scans_are_counted_by_state(memory: Memory, request_for_views: ScanRequest, burst: Burst) -> None:
