@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +15,8 @@ from core.encode import EncodedBurst
 from core.matches import Matches
 from core.packing import burst_as_arrays
 from core.pose_estimate import PoseEstimate
+from store.arrays import Array
 
-Array = NDArray[Any]
 MATCH = "match_"
 """Prefix of the arrays of `Matches`."""
 

@@ -50,10 +50,10 @@ class Server(uvicorn.Server):
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         """Uvicorn's, which cancels what takes longer than the grace; so work comes first."""
-        app: Running = self._app.state.running
-        app.work.stop()
-        app.agent.events.close()
-        while app.work.running and not self.force_exit:
+        running: Running = self._app.state.running
+        running.work.stop()
+        running.agent.events.close()
+        while running.work.running and not self.force_exit:
             await asyncio.sleep(POLL_S)
         await super().shutdown(sockets)
 
@@ -62,14 +62,14 @@ class Server(uvicorn.Server):
 
         A pass that hangs is waited for while something else writes: that will be answered.
         """
-        app: Running = self._app.state.running
+        running: Running = self._app.state.running
         watched = (
-            ("a pass of the backbone has run", 0.0 if app.work.writing else app.agent.backbone.pass_s(), 2),
-            ("all workers have been held by requests that were given up", app.work.stuck_s() or 0.0, 1),
-            ("a write has gone on after its deadline", app.work.late_write_s(), WRITE_DEADLINES),
+            ("a pass of the backbone has run", 0.0 if running.work.writing else running.agent.backbone.pass_s(), 2),
+            ("all workers have been held by requests that were given up", running.work.stuck_s() or 0.0, 1),
+            ("a write has gone on after its deadline", running.work.late_write_s(), WRITE_DEADLINES),
             ("the event loop has stood still", self._still_s, WRITE_DEADLINES),
         )
-        deadline_s = app.settings.deadline_s
+        deadline_s = running.settings.deadline_s
         return next((f"{what} for {seconds:.0f} s" for what, seconds, times in watched if seconds > times * deadline_s), None)
 
     def _watch(self) -> None:

@@ -17,6 +17,7 @@ from service.deps import AgentDep
 from service.exchange import MemoryRoute
 from service.gallery import CategoryGallery
 from service.routes.png import Side, png
+from service.schemas.fields import LONGEST_NAME
 from store.overview import Order
 
 router = APIRouter(prefix="/categories", route_class=Page, include_in_schema=False)
@@ -34,7 +35,7 @@ def categories(
     agent: AgentDep,
     page: Annotated[int, Query(ge=1, le=10_000)] = 1,
     order: Annotated[Order, Query()] = "name",
-    called: Annotated[str, Query(max_length=200)] = "",
+    called: Annotated[str, Query(max_length=LONGEST_NAME)] = "",
     change: Annotated[str | None, Query()] = None,
 ) -> HTMLResponse:
     """All of them, a page at a time."""

@@ -13,10 +13,10 @@ from service.agent import Agent
 from service.console.pages import Page, query, render
 from service.console.words import change_words
 from service.deps import ActorDep, AgentDep, WorkDep
+from service.schemas.fields import LONGEST_NAME
 from store.records import AuditEntry
 
 router = APIRouter(route_class=Page, include_in_schema=False)
-LONGEST_NAME = 200
 Name = Annotated[str, Form(max_length=LONGEST_NAME)]
 
 

@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
+from service.schemas.fields import LONGEST_NAME
+
 Numbers = list[float] | list[list[float]]
 
 
@@ -64,7 +66,9 @@ class BurstPart(BaseModel):
         },
     )
 
-    frame: str | None = Field(None, max_length=200, description="Name of the world frame; given back with the answer, never interpreted.")
+    frame: str | None = Field(
+        None, max_length=LONGEST_NAME, description="Name of the world frame; given back with the answer, never interpreted."
+    )
     depth_scale: float = Field(0.001, gt=0, le=1000, description="Metres a unit of the depth images: 0.001 for millimetres.")
     views: list[ViewPart] | None = Field(
         None, description="One camera a view, in the order of the images; left out where cameras are not known."

@@ -6,7 +6,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from core.rearrange import Anchor
 from service import goals
-from service.schemas.fields import CreatedAt
+from service.schemas.fields import LONGEST_NAME, CreatedAt
 from service.schemas.geometry import Direction, Matrix4, Rigid, Similarity, as_up
 from store import records
 
@@ -14,7 +14,7 @@ ANCHOR = (
     "Which point goes exactly to its goal: the object's `center`, or the middle of its `base`, so that a smaller one stands on the same "
     "support."
 )
-GoalName = Field(None, min_length=1, max_length=200, description="What people call it.", examples=["on the shelf"])
+GoalName = Field(None, min_length=1, max_length=LONGEST_NAME, description="What people call it.", examples=["on the shelf"])
 
 
 class GoalQuery(BaseModel):

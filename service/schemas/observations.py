@@ -18,7 +18,7 @@ from core.sim3 import Sim3
 from core.views import FloatArray
 from service.agent import ObserveOptions
 from service.schemas import scans
-from service.schemas.fields import CreatedAt
+from service.schemas.fields import LONGEST_NAME, CreatedAt
 from service.schemas.geometry import Box, Direction, Matrix4, Quaternion, Similarity, Stretch, as_up
 from service.schemas.quality import Grounds
 from store import records
@@ -268,7 +268,7 @@ class Correction(BaseModel):
     model_config = ConfigDict(extra="forbid", json_schema_extra={"example": {"category_id": "4be0643f1d98573b97cdca98a65347dd"}})
 
     category_id: str | None = Field(description="The right category; null for a new one, made of the observation's own views.")
-    name: str | None = Field(None, min_length=1, max_length=200, description="Of the new category.", examples=["cup"])
+    name: str | None = Field(None, min_length=1, max_length=LONGEST_NAME, description="Of the new category.", examples=["cup"])
 
     @model_validator(mode="after")
     def _only_new_ones_are_named(self) -> Correction:
