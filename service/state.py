@@ -1,4 +1,4 @@
-"""What the application keeps for its requests, and what is known of a request, by their types."""
+"""What the application keeps for its requests, by its types."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from starlette.requests import HTTPConnection
 
 from core.warm import WarmConfig
 from service.agent import Agent
-from service.auth import Caller, Guard
+from service.auth import Guard
 from service.console.demo import Demo
 from service.metrics import Metrics
 from service.settings import Settings
@@ -42,9 +42,3 @@ def running(connection: HTTPConnection) -> Running:
     """Of the application that is asked."""
     found: Running = connection.app.state.running
     return found
-
-
-def caller_of(connection: HTTPConnection) -> Caller:
-    """Whom the guard let in."""
-    caller: Caller = connection.state.caller
-    return caller

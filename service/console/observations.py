@@ -18,7 +18,6 @@ from service.console.pages import Page, render
 from service.console.words import called
 from service.deps import AgentDep, CallerDep, WorkDep
 from service.features import pose_details_from_arrays
-from service.state import caller_of
 from store.records import Observation
 
 router = APIRouter(prefix="/observations", route_class=Page, include_in_schema=False)
@@ -51,7 +50,7 @@ def observations(
 
 
 @router.get("/{observation_id}")
-def observation(request: Request, observation_id: str, agent: AgentDep, show: Picture | None = None) -> HTMLResponse:
+def observation(request: Request, observation_id: str, agent: AgentDep, caller: CallerDep, show: Picture | None = None) -> HTMLResponse:
     """One of them, with everything that its answer rests on."""
     seen = agent.memory.observations.get(observation_id)
     names = agent.names()
@@ -67,7 +66,7 @@ def observation(request: Request, observation_id: str, agent: AgentDep, show: Pi
         scan=agent.memory.scans.get(seen.scan_id) if seen.scan_id else None,
         hypotheses=Hypothesis.all_of(seen.pose) if seen.pose else [],
         stages=Stage.all_of(seen.timings_ms),
-        may_correct=caller_of(request).may_call("correct_observation"),
+        may_correct=caller.may_call("correct_observation"),
         **_evidence(agent, seen),
     )
 
