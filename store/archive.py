@@ -14,6 +14,7 @@ import os
 import re
 import zipfile
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
@@ -151,7 +152,8 @@ def export(
     except OSError as error:
         raise Unavailable(f"cannot export to {path}: {error}; free space, or choose another file") from error
     finally:
-        partial.unlink(missing_ok=True)
+        with suppress(OSError):  # there may be none, nor a folder for it
+            partial.unlink()
     return Export(path, len(parts), path.stat().st_size)
 
 

@@ -106,6 +106,12 @@ def test_an_export_never_replaces_a_file_and_is_never_empty(learnt: Memory, seco
         second.export(tmp_path / "none.zip")
 
 
+def test_an_export_that_cannot_be_written_is_told_with_the_remedy(learnt: Memory, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("no folder")
+    with pytest.raises(Unavailable, match="cannot export to .*; free space, or choose another file"):
+        learnt.export(tmp_path / "file" / "all.zip")
+
+
 def test_the_same_categories_make_the_same_entries(learnt: Memory, archive: Path, tmp_path: Path) -> None:
     def content(path: Path) -> dict[str, bytes]:
         with zipfile.ZipFile(path) as file:

@@ -61,6 +61,14 @@ def test_a_damaged_file_is_named_before_anything_is_made_of_it(tmp_path: Path, b
             read_burst(tmp_path, files)
 
 
+def test_a_file_that_never_was_written_is_named(tmp_path: Path, burst: Burst) -> None:
+    write_burst(tmp_path, burst)
+    files = sums(tmp_path)
+    del files["002_mask.png"]
+    with pytest.raises(Unavailable, match=r"002_mask\.png is missing from the memory"):
+        read_burst(tmp_path, files)
+
+
 def test_a_file_that_cannot_be_read_is_named(tmp_path: Path, burst: Burst) -> None:
     write_burst(tmp_path, burst)
     files = sums(tmp_path)

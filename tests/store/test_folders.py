@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from store.folders import new_folder, remove_orphans
+from store.folders import FileSum, new_folder, problem, remove_orphans
 
 
 def test_a_folder_gets_its_name_when_it_is_whole(tmp_path: Path) -> None:
@@ -34,3 +34,12 @@ def test_orphans_are_removed_and_named(tmp_path: Path) -> None:
         (tmp_path / name).mkdir()
     assert remove_orphans(tmp_path, {"kept"}) == [".partial-b", "orphan"]
     assert [path.name for path in tmp_path.iterdir()] == ["kept"]
+
+
+def test_a_file_that_is_what_was_written_has_no_problem(tmp_path: Path) -> None:
+    (tmp_path / "file").write_bytes(b"content")
+    assert problem(tmp_path / "file", FileSum.of(b"content")) is None
+
+
+def test_what_cannot_be_read_has_the_machine_s_problem(tmp_path: Path) -> None:
+    assert problem(tmp_path, FileSum.of(b"content")) == "cannot be read: Is a directory"

@@ -135,6 +135,12 @@ def test_a_new_memory_and_one_of_this_version_are_not_copied(folder: Path) -> No
     assert list(folder.glob("*before*")) == []
 
 
+def test_one_of_an_earlier_version_is_upgraded_before_it_is_only_read(first_version: Path) -> None:
+    with Memory.reading(first_version) as memory:
+        (cup,) = memory.categories.all()
+        assert memory.instances.of(cup.id)
+
+
 def test_without_room_for_the_copy_nothing_is_upgraded(first_version: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     before = dump(first_version / "memory.sqlite3")
 

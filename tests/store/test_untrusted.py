@@ -55,6 +55,14 @@ def test_an_entry_of_fewer_bytes_than_it_says_is_refused() -> None:
         untrusted.content(archive, info)
 
 
+def test_an_entry_that_is_not_what_was_packed_is_refused() -> None:
+    archive = zipped(("a", b"four"))
+    info = archive.getinfo("a")
+    info.CRC ^= 1
+    with pytest.raises(InvalidInput, match="'a' cannot be read .*copy the archive again"):
+        untrusted.content(archive, info)
+
+
 def test_a_picture_that_begins_as_one_and_goes_on_as_another_thing_is_refused() -> None:
     written = cv2.imencode(".png", np.zeros((4, 4, 3), np.uint8))[1].tobytes()
     untrusted.require_picture(written, "a.png")
