@@ -240,8 +240,8 @@ class Memory:
         self.close()
 
     def _meta(self, key: str) -> str | None:
-        rows = self._connection.rows("SELECT value FROM meta WHERE key = ?", key)
-        return str(rows[0]["value"]) if rows else None
+        row = self._connection.row("SELECT value FROM meta WHERE key = ?", key)
+        return str(row["value"]) if row else None
 
 
 def _lock(folder: Path) -> TextIOWrapper:

@@ -15,7 +15,7 @@ from store.bursts import read_burst, write_burst
 from store.columns import files_from_json, files_to_json, request_from_json, request_to_json
 from store.connection import Connection, Row, new_id
 from store.folders import Files
-from store.records import Scan
+from store.records import Scan, ScanState
 from store.times import ahead, now
 
 SELECT = """
@@ -23,7 +23,9 @@ SELECT = """
     (SELECT coalesce(sum(b.views), 0) FROM scan_bursts b WHERE b.scan_id = s.id) AS views
     FROM scans s LEFT JOIN categories c ON c.id = s.category_id AND c.removed_by IS NULL
 """
-OPEN = "state IN ('requested', 'collecting')"
+OPEN_STATES: tuple[ScanState, ...] = ("requested", "collecting")
+"""Views may still come."""
+OPEN = f"state IN {OPEN_STATES}"
 
 
 class Scans:
@@ -149,7 +151,7 @@ def _scan(row: Row) -> Scan:
     return Scan(
         row["id"],
         row["created_at"],
-        "expired" if row["state"] in ("requested", "collecting") and row["expires_at"] <= now() else row["state"],
+        "expired" if row["state"] in OPEN_STATES and row["expires_at"] <= now() else row["state"],
         request_from_json(row["request"]),
         row["views"],
         row["observation_id"],

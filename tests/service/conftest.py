@@ -6,6 +6,7 @@ import base64
 import io
 import json
 import shutil
+import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -17,7 +18,7 @@ import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
-from core.backbones.base import Backbone
+from core.backbones.base import Backbone, Features
 from core.camera_poses import hemisphere
 from core.sim3 import Sim3
 from core.views import Burst
@@ -69,6 +70,26 @@ def colour_only(about: dict[str, Any], files: dict[str, list[bytes]]) -> None:
     """An edit of `parts` that leaves photographs: neither cameras nor depth."""
     del about["views"]
     files["depth"].clear()
+
+
+class Gate:
+    """A backbone whose passes wait until they are let through."""
+
+    def __init__(self, backbone: Backbone) -> None:
+        self.__dict__.update(
+            {name: getattr(backbone, name) for name in ("name", "patch_size", "dim", "has_saliency", "whitening", "fingerprint")}
+        )
+        self._backbone = backbone
+        self.open, self.entered = threading.Event(), threading.Event()
+        self.passes: list[int] = []
+        """Images of each."""
+
+    def extract(self, images: np.ndarray) -> Features:
+        """See `Backbone.extract`."""
+        self.passes.append(len(images))
+        self.entered.set()
+        self.open.wait(LONG_S)
+        return self._backbone.extract(images)
 
 
 def until(what: Callable[[], object]) -> None:

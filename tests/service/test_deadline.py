@@ -16,27 +16,9 @@ from service.app import create_app
 from service.cancelling import Cancellation, present, require_wanted
 from service.refusals import Busy, CalledOff, ClientGone, TooLate
 from service.work import WorkQueue
-from tests.service.conftest import until
+from tests.service.conftest import LONG_S, Gate, until
 
-SOON_S, LONG_S = 0.1, 20
-
-
-class Held:
-    """A backbone whose passes wait until they are let through."""
-
-    def __init__(self, backbone):
-        self._backbone = backbone
-        self.open, self.entered = threading.Event(), threading.Event()
-        self.images = 0
-
-    def __getattr__(self, name):
-        return getattr(self._backbone, name)
-
-    def extract(self, stack):
-        self.entered.set()
-        self.images += len(stack)
-        self.open.wait(LONG_S)
-        return self._backbone.extract(stack)
+SOON_S = 0.1
 
 
 def asks(done):
@@ -135,15 +117,15 @@ def test_workers_that_never_come_back_are_told_of_and_not_waited_for():
 
 
 def test_a_burst_over_its_deadline_is_answered_and_changes_nothing(settings, backbone, look, parts):
-    held = Held(backbone)
-    with TestClient(create_app(settings.model_copy(update={"deadline_s": 1.0, "workers": 1}), backbone=held)) as client:
+    gate = Gate(backbone)
+    with TestClient(create_app(settings.model_copy(update={"deadline_s": 1.0, "workers": 1}), backbone=gate)) as client:
         late = client.post("/v1/observations", files=parts(look()), headers={"Idempotency-Key": "once"})
         assert (late.status_code, late.json()["type"]) == (503, "urn:onelook:problem:unavailable")
         assert "ONELOOK_DEADLINE_S" in late.json()["detail"]
         unready = client.get("/readyz")
         assert (unready.status_code, client.get("/healthz").status_code) == (503, 200)
         assert "given up" in unready.json()["detail"]
-        held.open.set()
+        gate.open.set()
         until(lambda: client.get("/readyz").status_code == 200)
         assert client.get("/v1/observations").json()["observations"] == []
         again = client.post("/v1/observations", files=parts(look()), headers={"Idempotency-Key": "once"})
@@ -152,18 +134,18 @@ def test_a_burst_over_its_deadline_is_answered_and_changes_nothing(settings, bac
 
 
 def test_a_client_that_goes_away_before_its_turn_costs_nothing(settings, backbone, serving, look, parts):
-    held, burst = Held(backbone), look(views=3)
-    with serving(settings.model_copy(update={"workers": 1}), held) as url, httpx.Client(base_url=url, timeout=LONG_S) as client:
+    gate, burst = Gate(backbone), look(views=3)
+    with serving(settings.model_copy(update={"workers": 1}), gate) as url, httpx.Client(base_url=url, timeout=LONG_S) as client:
         first = threading.Thread(target=lambda: client.post("/v1/observations", files=parts(burst)))
         first.start()
-        held.entered.wait(LONG_S)
+        gate.entered.wait(LONG_S)
         with pytest.raises(httpx.ReadTimeout):
             httpx.post(f"{url}/v1/observations", files=parts(look(views=5)), timeout=0.5)
         until(lambda: "onelook_work_waiting 0.0" in client.get("/metrics").text)
-        held.open.set()
+        gate.open.set()
         first.join()
         assert len(client.get("/v1/observations").json()["observations"]) == 1
-    assert held.images == 2 * 3, "two passes of the first burst's views, and none of the other's"
+    assert sum(gate.passes) == 2 * 3, "two passes of the first burst's views, and none of the other's"
 
 
 def test_a_body_that_comes_too_slowly_is_answered(settings, backbone, serving):

@@ -10,6 +10,7 @@ from fastapi.testclient import TestClient
 from service.app import create_app
 from service.exchange import MemoryRoute
 from service.routes.install import MADE, ROUTERS
+from tests.service.conftest import LONG_S, Gate
 
 KEY = {"Idempotency-Key": "4f1c"}
 
@@ -122,21 +123,14 @@ def test_a_goal_whose_process_ended_after_its_observation_is_made_at_the_repetit
 
 
 def test_the_same_request_twice_at_once_is_done_once(settings, backbone, look, parts):
-    started, finish = threading.Event(), threading.Event()
-
-    class Slow(type(backbone)):
-        def extract(self, images):
-            started.set()
-            finish.wait(10)
-            return super().extract(images)
-
-    with TestClient(create_app(settings, backbone=Slow())) as client:
+    gate = Gate(backbone)
+    with TestClient(create_app(settings, backbone=gate)) as client:
         files, answers = parts(look()), []
         first = threading.Thread(target=lambda: answers.append(client.post("/v1/observations", files=files, headers=KEY)))
         first.start()
-        started.wait(10)
+        gate.entered.wait(LONG_S)
         meanwhile = client.post("/v1/observations", files=files, headers=KEY)
-        finish.set()
+        gate.open.set()
         first.join()
         assert (meanwhile.status_code, meanwhile.headers["retry-after"]) == (409, "1")
         assert answers[0].status_code == 201

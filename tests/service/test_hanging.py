@@ -21,13 +21,12 @@ from service.batching import BatchingBackbone
 from service.cancelling import present
 from service.server import WRITE_DEADLINES, Server
 from service.work import WorkQueue
-from tests.service.conftest import until
+from tests.service.conftest import LONG_S, Gate, until
 from tests.service.test_stopping import Process, served
 
 DEADLINE_S = 1.5
 SHORT_S = 0.15
 """Of a service that is not asked for anything that takes long."""
-LONG_S = 60.0
 
 
 def asked_until_it_ends(service: Process, ask: Any) -> dict[str, Any]:
@@ -102,22 +101,15 @@ def test_what_hangs_had_a_second_deadline_and_what_may_be_a_slow_disk_ten(found:
 
 
 def test_a_pass_that_takes_longer_than_a_request_may_is_not_sound(backbone: Any) -> None:
-    release, entered = threading.Event(), threading.Event()
-
-    class Hangs(type(backbone)):  # type: ignore[misc]
-        def extract(self, images: Any) -> Any:
-            entered.set()
-            release.wait(LONG_S)
-            return super().extract(images)
-
-    batching = BatchingBackbone(Hangs(), deadline_s=SHORT_S)
+    gate = Gate(backbone)
+    batching = BatchingBackbone(gate, deadline_s=SHORT_S)
     thread = threading.Thread(target=batching.extract, args=(np.zeros((1, 16, 16, 3), np.uint8),))
     thread.start()
-    entered.wait(LONG_S)
+    gate.entered.wait(LONG_S)
     until(lambda: batching.pass_s() > SHORT_S)
     with pytest.raises(Unavailable, match="a pass of the backbone colour has run"):
         batching.require_sound()
-    release.set()
+    gate.open.set()
     thread.join()
     assert batching.pass_s() == 0
     batching.require_sound()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import json
-import threading
 from dataclasses import replace
 
 import anyio
@@ -20,7 +19,7 @@ from core.warm import WarmConfig
 from service import tracker
 from service.app import create_app
 from service.routes.track import WAITING_FRAMES, Waiting
-from tests.service.conftest import as_text
+from tests.service.conftest import LONG_S, Gate, as_text
 
 UP = np.array([0.0, 0.0, 1.0])
 PLACED = Sim3(1.0, Rotation.from_euler("z", 50, degrees=True).as_matrix(), np.array([0.3, -0.1, 0.05]))
@@ -182,25 +181,17 @@ def test_no_more_are_followed_than_set(settings, backbone):
 
 
 def test_frames_that_come_too_fast_are_dropped_oldest_first_and_told(settings, backbone, look, parts, camera_round):
-    gate, entered = threading.Event(), threading.Event()
-
-    class Slow(type(backbone)):
-        def extract(self, images):
-            entered.set()
-            gate.wait(10)
-            return super().extract(images)
-
-    views = camera_round(PLACED, 8)
-    with TestClient(create_app(settings, backbone=Slow())) as client, client.websocket_connect("/v1/track") as socket:
+    gate, views = Gate(backbone), camera_round(PLACED, 8)
+    with TestClient(create_app(settings, backbone=gate)) as client, client.websocket_connect("/v1/track") as socket:
         socket.send_json({"type": "hello"})
         socket.receive_json()
         socket.send_json(message(0, views[0]))
-        entered.wait(10)
+        gate.entered.wait(LONG_S)
         for number in range(1, 8):
             socket.send_json(message(number, views[number]))
         socket.send_text(json.dumps({"type": "end"}))  # answered at once, so all frames have arrived then
         assert socket.receive_json()["type"] == "problem"
-        gate.set()
+        gate.open.set()
         answers = [socket.receive_json() for _ in range(4)]
     assert (answers[0]["type"], answers[0]["frame_id"]) == ("pose", 0)
     assert answers[1] == {"type": "dropped", "frames": 7 - WAITING_FRAMES, "first_id": 1, "last_id": 7 - WAITING_FRAMES}

@@ -15,25 +15,7 @@ from service.app import create_app
 from service.batching import LARGEST_PASS, BatchingBackbone
 from service.refusals import Busy
 from service.work import WorkQueue
-
-
-class Gate:
-    """A backbone whose passes wait until they are let through."""
-
-    def __init__(self, backbone):
-        self.__dict__.update(
-            {name: getattr(backbone, name) for name in ("name", "patch_size", "dim", "has_saliency", "whitening", "fingerprint")}
-        )
-        self._backbone = backbone
-        self.open = threading.Event()
-        self.entered = threading.Event()
-        self.passes = []
-
-    def extract(self, images):
-        self.passes.append(len(images))
-        self.entered.set()
-        self.open.wait(10)
-        return self._backbone.extract(images)
+from tests.service.conftest import Gate
 
 
 def images(seed, views=2, side=16):
