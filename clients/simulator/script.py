@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Mapping, Sequence
-from dataclasses import MISSING, asdict, dataclass, field, fields, replace
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Literal
 
 import yaml
+from pydantic import ConfigDict, Field, StrictBool, StrictInt, TypeAdapter, ValidationError
 
 from clients.datasets.folders import by_category
 from clients.datasets.samples import data_or_samples
@@ -19,8 +20,9 @@ from clients.simulator.replay import ReplaySubject
 from clients.simulator.world import Subject
 from core.errors import InvalidInput
 
-WORLDS = ("raycast", "replay")
-ORDERS = ("random", "grouped")
+NO_OTHERS = ConfigDict(extra="forbid")
+"""Names that are no field are refused."""
+Positive = Annotated[StrictInt, Field(ge=1)]
 DRAWN_CATEGORIES = 5
 """Where a script names none."""
 ROBOT_SEEDS = 1_000
@@ -31,7 +33,9 @@ ROBOT_SEEDS = 1_000
 class Faults:
     """What goes wrong on purpose."""
 
-    lost_views: float = 0.0
+    __pydantic_config__ = NO_OTHERS
+
+    lost_views: Annotated[float, Field(ge=0, lt=1)] = 0.0
     """Share of views that never arrive."""
     sensor: Mapping[str, float] = field(default_factory=dict)
     """Settings of the rendered world's camera, such as `disparity_noise_px: 0.3`."""
@@ -41,7 +45,9 @@ class Faults:
 class Script:
     """See module; every field may be left out."""
 
-    world: str = "raycast"
+    __pydantic_config__ = NO_OTHERS
+
+    world: Literal["raycast", "replay"] = "raycast"
     """`raycast` renders, `replay` plays recordings."""
     data: str | None = None
     """Recordings for `replay`; the samples of the repository where left out."""
@@ -49,20 +55,20 @@ class Script:
     """Meshes of a user's own for `raycast`, in place of the simulator's categories."""
     categories: tuple[str, ...] = ()
     """Which to draw objects from; five drawn by the seed where left out."""
-    instances: int = 3
+    instances: Positive = 3
     """Objects of each category."""
-    length: int | None = None
+    length: Positive | None = None
     """Objects met; some repeatedly where there are fewer. Each once where left out."""
-    order: str = "random"
+    order: Literal["random", "grouped"] = "random"
     """`random`, or `grouped`: one category after the other."""
-    views: int = 8
+    views: Positive = 8
     """In the burst of each encounter."""
-    waypoints: int = 0
+    waypoints: Annotated[StrictInt, Field(ge=0)] = 0
     """Random ones from which an object taken for known is looked at once more, each view by itself."""
-    seed: int = 0
-    robots: int = 1
+    seed: StrictInt = 0
+    robots: Positive = 1
     """That share the memory, each in a world of its own."""
-    teacher: bool = False
+    teacher: StrictBool = False
     """Whether a teacher teaches, asks and corrects, in place of the robot's own discovery."""
     faults: Faults = Faults()
 
@@ -126,64 +132,25 @@ def read_script(file: Path) -> Script:
     return script_from(content or {})
 
 
-def script_from(content: Any) -> Script:
+def script_from(content: object) -> Script:
     """A script from what YAML holds. Raises InvalidInput naming the field that is wrong."""
-    given = _checked(Script, content, "")
-    if "faults" in given:
-        given["faults"] = Faults(**_checked(Faults, given["faults"], "faults."))
-    if "categories" in given:
-        given["categories"] = tuple(given["categories"])
-    return check(Script(**given))
+    try:
+        return check(TypeAdapter(Script).validate_python(content))
+    except ValidationError as error:
+        first = error.errors()[0]
+        field = ".".join(str(part) for part in first["loc"]) or "script"
+        if first["type"] == "unexpected_keyword_argument":
+            known = fields(Faults if field.startswith("faults.") else Script)
+            raise InvalidInput(field, f"is none of {', '.join(each.name for each in known)}") from None
+        raise InvalidInput(field, f"{first['msg']}, found {first['input']!r:.60}") from None
 
 
 def check(script: Script) -> Script:
-    """The script itself. Raises InvalidInput naming the field that is wrong."""
-    for name, value, allowed in (("world", script.world, WORLDS), ("order", script.order, ORDERS)):
-        if value not in allowed:
-            raise InvalidInput(name, f"{value!r} is none of {', '.join(allowed)}")
-    for name in ("instances", "views", "robots", "length"):
-        number = getattr(script, name)
-        if number is not None and number < 1:
-            raise InvalidInput(name, f"expected 1 or more, found {number}")
-    if script.waypoints < 0:
-        raise InvalidInput("waypoints", f"expected 0 or more, found {script.waypoints}")
+    """The script itself. Raises InvalidInput naming the field that does not go with the others."""
     if script.waypoints and script.teacher:
         raise InvalidInput("waypoints", "are not visited where a teacher asks: leave them or the teacher out")
-    if not 0 <= script.faults.lost_views < 1:
-        raise InvalidInput("faults.lost_views", f"expected a share from 0 to below 1, found {script.faults.lost_views}")
     if script.world != "raycast" and (script.meshes or script.faults.sensor):
         raise InvalidInput("meshes" if script.meshes else "faults.sensor", "is for the world `raycast`: recordings are as they are")
     if script.world != "replay" and script.data:
         raise InvalidInput("data", "is for the world `replay`: name the world, or leave the recordings out")
     return script
-
-
-def _checked(kind: type, content: Any, prefix: str) -> dict[str, Any]:
-    """The fields that a file gives, each of the type of its default."""
-    if not isinstance(content, Mapping):
-        raise InvalidInput(prefix.rstrip(".") or "script", f"expected names and values, found {content!r:.60}")
-    known = {each.name: each for each in fields(kind)}
-    for name, value in content.items():
-        if name not in known:
-            raise InvalidInput(f"{prefix}{name}", f"is none of {', '.join(known)}")
-        default = known[name].default
-        expected = _expected(default if default is not MISSING else {})
-        if not isinstance(value, expected) or isinstance(value, bool) != (expected is bool):
-            raise InvalidInput(f"{prefix}{name}", f"expected {_words(expected)}, found {value!r:.60}")
-    return dict(content)
-
-
-def _expected(default: object) -> Any:
-    if default is None:
-        return (str, int)
-    if isinstance(default, bool):
-        return bool
-    if isinstance(default, tuple):
-        return Sequence
-    if isinstance(default, (Mapping, Faults)):
-        return Mapping
-    return (int, float) if isinstance(default, float) else type(default)
-
-
-def _words(expected: Any) -> str:
-    return " or ".join(each.__name__ for each in (expected if isinstance(expected, tuple) else (expected,)))
