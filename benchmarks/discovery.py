@@ -29,6 +29,7 @@ from benchmarks.parallel import map_jobs
 from benchmarks.tables import Row, print_table, write_json
 from clients.datasets.sources import find_sequences
 from core.backbones import EMBEDDED, load_backbone
+from core.backbones.whitening import Whitening
 from core.calibration import Calibration, Prior
 from core.encode import EncodedBurst, Encoder
 from core.errors import InvalidInput
@@ -108,14 +109,7 @@ def run(
     if len(objects) < 2 or objects.max() < 2:
         raise InvalidInput("data", "discovery needs two categories, and two objects of one of them")
     network = load_backbone(backbone)
-    files = encode_all(sequences, Encoder(network))
-    bursts = [read_views(file) for file in files]
-    tables: dict[str, PairScores | BestPairs] = {**pair_tables(bursts, scores)}
-    if not scores or BEST in scores:
-        agreement = agreements(files, network.whitening) if poses else None
-        best = BestPairs(matches(bursts, network.whitening), agreement, Prior.shipped())
-        alone = replace(best, agreement=None)
-        tables |= {BEST: best, TOKENS: alone} if has_poses(best) else {BEST: alone}
+    tables = _all_tables(encode_all(sequences, Encoder(network)), network.whitening, scores, poses)
     orders = draw_orders(episodes, labels, length, seed)
     started = time.perf_counter()
     rows = [row for name, table in tables.items() for row in score_rows(name, table, labels, orders)]
@@ -147,6 +141,19 @@ def run(
     if rates:
         print_table("Threshold from a false-known rate", rates, RATE_COLUMNS)
     return rows + rates
+
+
+def _all_tables(
+    files: Sequence[Path], whitening: Whitening | None, scores: Sequence[str], poses: bool
+) -> dict[str, PairScores | BestPairs]:
+    """Of encoded bursts, by score; `best` twice where poses can verify it."""
+    bursts = [read_views(file) for file in files]
+    tables: dict[str, PairScores | BestPairs] = {**pair_tables(bursts, scores)}
+    if scores and BEST not in scores:
+        return tables
+    best = BestPairs(matches(bursts, whitening), agreements(files, whitening) if poses else None, Prior.shipped())
+    alone = replace(best, agreement=None)
+    return tables | ({BEST: best, TOKENS: alone} if has_poses(best) else {BEST: alone})
 
 
 def pair_tables(bursts: Sequence[EncodedBurst], scores: Sequence[str]) -> dict[str, PairScores]:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import matplotlib
+from matplotlib.figure import Figure
 
 PAPER = (0.0, 26.0)
 """FP and FN that the paper reports, in percent, on CO3D with DINO."""
@@ -14,10 +14,8 @@ PAPER = (0.0, 26.0)
 
 def plot(file: Path, rows: Sequence[Mapping[str, Any]], title: str) -> None:
     """FN against FP with the band of 90 % of the episodes, and the growth of the memory at 1 % FP against the truth."""
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
-
-    figure, (errors, growth) = pyplot.subplots(1, 2, figsize=(11, 4.5), constrained_layout=True)
+    figure = Figure((11, 4.5), layout="constrained")
+    errors, growth = figure.subplots(1, 2)
     truth = None
     for name in dict.fromkeys(str(row["score"]) for row in rows):
         curve = sorted((row for row in rows if row["score"] == name and "auroc" not in row), key=lambda row: (row["fp"], -row["fn"]))
@@ -37,4 +35,3 @@ def plot(file: Path, rows: Sequence[Mapping[str, Any]], title: str) -> None:
     growth.legend(fontsize=8)
     figure.suptitle(title, fontsize=10)
     figure.savefig(file, dpi=110)
-    pyplot.close(figure)

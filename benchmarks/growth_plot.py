@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import matplotlib
+from matplotlib.figure import Figure
 
 if TYPE_CHECKING:
     from benchmarks.growth import GrowthRow
@@ -21,10 +21,8 @@ TARGET_MS = 10.0
 
 def plot_growth(file: Path, rows: Sequence[GrowthRow], title: str) -> None:
     """Against the number of categories: milliseconds of a decision, megabytes, and milliseconds of a start."""
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
-
-    figure, (decision, memory, start) = pyplot.subplots(1, 3, figsize=SIZE, constrained_layout=True)
+    figure = Figure(SIZE, layout="constrained")
+    decision, memory, start = figure.subplots(1, 3)
     sizes = [row.categories for row in rows]
     for name, label in (
         ("decide_ms", "a decision"),
@@ -51,4 +49,3 @@ def plot_growth(file: Path, rows: Sequence[GrowthRow], title: str) -> None:
     file.parent.mkdir(parents=True, exist_ok=True)
     figure.suptitle(title, fontsize=10)
     figure.savefig(file, dpi=DPI)
-    pyplot.close(figure)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-import matplotlib
+from matplotlib.figure import Figure
 
 from benchmarks.crowd import FATES
 
@@ -22,7 +22,8 @@ DPI = 110
 
 def plot_load(file: Path, rows: Sequence[LoadRow], title: str) -> None:
     """Against the number of robots: what is answered and refused a second, how long an answer takes, queue and memory."""
-    figure, (rate, times, inside) = _panels(3)
+    figure = Figure(SIZE, layout="constrained")
+    rate, times, inside = figure.subplots(1, 3)
     robots = [row.robots for row in rows]
     took = [row.answered / row.per_s if row.per_s else float("nan") for row in rows]
     rate.plot(robots, [row.per_s for row in rows], "o-", label="answered")
@@ -49,7 +50,8 @@ def plot_load(file: Path, rows: Sequence[LoadRow], title: str) -> None:
 
 def plot_soak(file: Path, record: Record, title: str) -> None:
     """Resident memory over time, and what was answered in each part of it."""
-    figure, (memory, answers) = _panels(2)
+    figure = Figure(SIZE, layout="constrained")
+    memory, answers = figure.subplots(1, 2)
     memory.plot([sample.time_s / 60 for sample in record.samples], [sample.resident_mb for sample in record.samples])
     memory.set(xlabel="minutes", ylabel="resident memory, MB", ylim=(0, None))
     answered = record.of("answered")
@@ -64,17 +66,7 @@ def plot_soak(file: Path, record: Record, title: str) -> None:
     _save(figure, file, title)
 
 
-def _panels(count: int) -> tuple[Any, Any]:
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
-
-    return pyplot.subplots(1, count, figsize=SIZE, constrained_layout=True)
-
-
-def _save(figure: Any, file: Path, title: str) -> None:
-    from matplotlib import pyplot
-
+def _save(figure: Figure, file: Path, title: str) -> None:
     file.parent.mkdir(parents=True, exist_ok=True)
     figure.suptitle(title, fontsize=10)
     figure.savefig(file, dpi=DPI)
-    pyplot.close(figure)

@@ -12,9 +12,9 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated
 
-import matplotlib
 import numpy as np
 import typer
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from benchmarks.pair_jobs import PairJob, pair_jobs
@@ -117,10 +117,8 @@ def _judge(data: str, encoder: Encoder, views: Sequence[str], limit: int, seed: 
 
 
 def _plot(file: Path, rows: Sequence[dict[str, float]], title: str) -> None:
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
-
-    figure, axes = pyplot.subplots(figsize=(5, 5), constrained_layout=True)
+    figure = Figure((5, 5), layout="constrained")
+    axes = figure.subplots()
     axes.plot([0, 100], [0, 100], "k--", linewidth=1, label="as said")
     axes.plot([row["confidence"] for row in rows], [row["right"] for row in rows], "o-", label="as measured")
     for row in rows:
@@ -128,7 +126,6 @@ def _plot(file: Path, rows: Sequence[dict[str, float]], title: str) -> None:
     axes.set(xlim=(0, 101), ylim=(0, 101), xlabel="confidence, %", ylabel="rotation within 30°, %", title=title)
     axes.legend(loc="upper left")
     figure.savefig(file, dpi=110)
-    pyplot.close(figure)
 
 
 if __name__ == "__main__":

@@ -119,13 +119,7 @@ def run(
 
     Raises InvalidInput for an unknown degradation, or data without two objects of a kind, ground truth, depth or enough views.
     """
-    listed = [each for each in catalogue([]) if not degradations or each.name in degradations]
-    unknown = set(degradations) - {each.name for each in listed}
-    if unknown:
-        known = ", ".join(each.name for each in catalogue([]))
-        raise InvalidInput("degradation", f"{', '.join(sorted(unknown))} is none of {known}")
-    if strongest is not None:
-        listed = [replace(each, strengths=each.strengths[-strongest:]) for each in listed]
+    listed = _listed(degradations, strongest)
     network = load_backbone(backbone)
     sequences = tuple(find_sequences(data))
     recordings = Recordings(sequences, tuple(encode_all(sequences, Encoder(network))), ViewCounts.parse(views), seed, backbone, poses)
@@ -153,6 +147,16 @@ def run(
     print_table(f"Robustness, {data}", [row for row in rows if "acc30" in row], COLUMNS)
     print_table(f"Where {FALL:.0f} points are lost", [row for row in rows if "acc30" not in row], BREAKS)
     return rows
+
+
+def _listed(names: Sequence[str], strongest: int | None) -> list[Degradation]:
+    """Those of the catalogue that are named, all where none is. Raises InvalidInput for a name that it does not have."""
+    known = {each.name: each for each in catalogue([])}
+    unknown = set(names) - set(known)
+    if unknown:
+        raise InvalidInput("degradation", f"{', '.join(sorted(unknown))} is none of {', '.join(known)}")
+    listed = [each for name, each in known.items() if not names or name in names]
+    return listed if strongest is None else [replace(each, strengths=each.strengths[-strongest:]) for each in listed]
 
 
 def plan(recordings: Recordings, limit: int | None, degradations: Sequence[Degradation]) -> list[Job]:

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import matplotlib
 import numpy as np
+from matplotlib.figure import Figure
 
 from benchmarks.tables import Row
 
@@ -24,12 +24,10 @@ LINES = {
 
 def plot(folder: Path, rows: Sequence[Row]) -> Path:
     """Writes FILE below `folder`: the undegraded first; shares with one standard error."""
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
-
     clean, breaks = rows[0], [row for row in rows if "acc30" not in row]
     down = -(-len(breaks) // COLUMNS)
-    figure, grid = pyplot.subplots(down, COLUMNS, figsize=(3.5 * COLUMNS, 2.9 * down), sharey=True, squeeze=False, constrained_layout=True)
+    figure = Figure((3.5 * COLUMNS, 2.9 * down), layout="constrained")
+    grid = figure.subplots(down, COLUMNS, sharey=True, squeeze=False)
     for axes, about in zip(grid.flat, breaks):
         curve = [clean, *(row for row in rows if row["degradation"] == about["degradation"] and "acc30" in row)]
         _draw(axes, curve)
@@ -41,7 +39,6 @@ def plot(folder: Path, rows: Sequence[Row]) -> Path:
     figure.legend(*grid[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=len(LINES))
     folder.mkdir(parents=True, exist_ok=True)
     figure.savefig(folder / FILE, dpi=110)
-    pyplot.close(figure)
     return folder / FILE
 
 

@@ -92,31 +92,10 @@ def run(
     """
     reference_burst, target_burst = (folders.load_burst(each, range(views)) for each in _two_objects(data_or_samples(data), views))
     network = load_backbone(backbone, device=device)
-    encoder = Encoder(network)
-    near = Encoder(network, EncoderConfig(context=CONTEXT))
-    exact = Encoder(load_backbone(backbone, device=device, dtype=torch.float32), EncoderConfig(context=None))
-    scanned, target = encoder.encode(reference_burst), encoder.encode(target_burst)
+    exact = load_backbone(backbone, device=device, dtype=torch.float32)
+    scanned = Encoder(network).encode(reference_burst)
     reference = build_reference(scanned)
-    many = build_reference(_repeated(scanned)), _repeated(target)
-    reduced, whole = (
-        MatchedPair(reference, target, dims, zero_shot_pose.CORRESPONDENCES, "cyclical") for dims in (PoseConfig().dims, None)
-    )
-    threshold_m = PoseConfig().inlier_ratio * cloud_extent_m(target.cloud_m)
-    memory = [Member.of("reference", scanned)]
-    operations: dict[str, Operation] = {"encode": partial(_encode, encoder, target_burst), "learn": partial(_learn, scanned)}
-    operations |= {f"decide {score}": partial(_decide, memory, target, score) for score in (BEST, *SCORES)}
-    operations |= {f"decide {BEST}, {VERIFIED} poses": partial(_verify, memory[0], target, reference, network.whitening)}
-    operations |= {f"solve {name}": partial(_solve, PoseEstimator(PoseConfig.named(name)), reference, target) for name in VARIANTS}
-    operations |= {_more(name): partial(_solve, PoseEstimator(PoseConfig.named(name)), *many) for name in GROWING}
-    operations |= {
-        STRAIGHTFORWARD: partial(_encode, exact, target_burst),
-        NEAR: partial(_encode, near, target_burst),
-        "complete depth, 640 by 480": partial(_complete, np.random.default_rng(0)),
-        PRODUCTS: partial(_without_stages, zero_shot_pose.bare_products, *reduced.descriptors),
-        RECIPE: partial(_without_stages, zero_shot_pose.solve, whole, threshold_m, 0),
-        BARE: partial(_without_stages, _bare_passes, network, encoder.config, views, device),
-    }
-    rows = table_rows(_rounds(operations, rounds), OBSERVATION)
+    rows = table_rows(_rounds(_operations(network, exact, scanned, reference, target_burst, device), rounds), OBSERVATION)
     targets = [asdict(row) for row in target_rows(rows, _megabytes(reference))]
     meta = {
         "benchmark": "speed",
@@ -132,6 +111,35 @@ def run(
     if plot is not None:
         speed_plot.plot(plot, _waterfall(rows), f"{views} views against a reference of {views}, {torch.get_num_threads()} threads")
     return rows
+
+
+def _operations(
+    network: Backbone, exact: Backbone, scanned: EncodedBurst, reference: Reference, burst: Burst, device: str
+) -> dict[str, Operation]:
+    """What is timed, by its name: `burst` against the reference of what was scanned. `exact` is the same network in single precision."""
+    encoder, near = Encoder(network), Encoder(network, EncoderConfig(context=CONTEXT))
+    straightforward = Encoder(exact, EncoderConfig(context=None))
+    target = encoder.encode(burst)
+    many = build_reference(_repeated(scanned)), _repeated(target)
+    reduced, whole = (
+        MatchedPair(reference, target, dims, zero_shot_pose.CORRESPONDENCES, "cyclical") for dims in (PoseConfig().dims, None)
+    )
+    threshold_m = PoseConfig().inlier_ratio * cloud_extent_m(target.cloud_m)
+    memory = [Member.of("reference", scanned)]
+    return {
+        "encode": partial(_encode, encoder, burst),
+        "learn": partial(_learn, scanned),
+        **{f"decide {score}": partial(_decide, memory, target, score) for score in (BEST, *SCORES)},
+        f"decide {BEST}, {VERIFIED} poses": partial(_verify, memory[0], target, reference, network.whitening),
+        **{f"solve {name}": partial(_solve, PoseEstimator(PoseConfig.named(name)), reference, target) for name in VARIANTS},
+        **{_more(name): partial(_solve, PoseEstimator(PoseConfig.named(name)), *many) for name in GROWING},
+        STRAIGHTFORWARD: partial(_encode, straightforward, burst),
+        NEAR: partial(_encode, near, burst),
+        "complete depth, 640 by 480": partial(_complete, np.random.default_rng(0)),
+        PRODUCTS: partial(_without_stages, zero_shot_pose.bare_products, *reduced.descriptors),
+        RECIPE: partial(_without_stages, zero_shot_pose.solve, whole, threshold_m, 0),
+        BARE: partial(_without_stages, _bare_passes, network, encoder.config, len(burst), device),
+    }
 
 
 def target_rows(rows: Sequence[SpeedRow], reference_mb: float) -> list[TargetRow]:

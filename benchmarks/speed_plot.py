@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-import matplotlib
 import numpy as np
+from matplotlib.figure import Figure
 
 ROOM_FOR_MS = 1.12
 """The axis, of the longest bar's end: its milliseconds are written behind it."""
@@ -14,10 +14,8 @@ ROOM_FOR_MS = 1.12
 
 def plot(file: Path, stages: Sequence[tuple[str, float, float]], title: str) -> None:
     """A waterfall. `stages` are a name, milliseconds, and milliseconds of the straightforward way, NaN where there is none."""
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
-
-    figure, axes = pyplot.subplots(figsize=(9, 0.45 * len(stages) + 1.4), constrained_layout=True)
+    figure = Figure((9, 0.45 * len(stages) + 1.4), layout="constrained")
+    axes = figure.subplots()
     start = end = 0.0
     for place, (_, ms, straightforward_ms) in enumerate(stages):
         axes.barh(place, straightforward_ms, left=start, height=0.7, color="0.88", label="straightforward" if place == 0 else None)
@@ -31,4 +29,3 @@ def plot(file: Path, stages: Sequence[tuple[str, float, float]], title: str) -> 
     axes.set_xlim(0, ROOM_FOR_MS * end)
     axes.legend(loc="lower left")
     figure.savefig(file, dpi=110)
-    pyplot.close(figure)

@@ -13,8 +13,10 @@ import pytest
 from benchmarks import soak
 
 ROOT = Path(__file__).parents[2]
-MINUTES = 1.5
-MOST_GROWTH = 0.05
+MINUTES = 0.75
+"""Some 450 errands where two other processes are at work; it settles within the first 200."""
+MOST_GROWTH = 0.03
+"""Of 500 MB, over the 220 errands between both ends that are compared: 70 kB an errand."""
 
 
 @pytest.fixture
