@@ -1,6 +1,7 @@
 """Whether one more look, from where an uncertain decision says, settles it: in the rendered world.
 
-Half of the categories are in a memory, by one object each. Other objects of all categories are met in a few views of one side. Where
+Half of the categories are in a memory, by one object each. It came to them as a robot does: one after the other was met in a few views of
+one side, which calibrates the memory, and then scanned. Other objects of all categories are met in as many views. Where
 the answer is uncertain, one view more is taken: from the first viewpoint that the decision offers, and in comparison from random ones of
 the same hemisphere. It settles the case rightly where the answer becomes the object's category, or novel for an object of none. Then the
 other half of the categories is the memory.
@@ -11,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from functools import cache
+from itertools import islice
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -71,6 +73,8 @@ class Job:
     """Views of one side with which an answer is first sought."""
     rate: float
     backbone: str
+    past: tuple[Decision, ...] = ()
+    """Of the members, as each was met."""
 
 
 @dataclass(frozen=True)
@@ -117,10 +121,16 @@ def run(
     with TemporaryDirectory() as folder:
         scans = [Scan(Thing(name, instances, seed), Path(folder) / f"{name}.npz", backbone) for name in names]
         map_jobs(learn, scans, lambda scan: 1, "learning")
-        halves = np.random.default_rng(seed).permutation(len(names)) % 2
-        memories = [tuple((scan.thing.category, scan.file) for scan, half in zip(scans, halves) if half == side) for side in (0, 1)]
+        shuffled = np.random.default_rng(seed).permutation(len(names))
+        memories = [tuple((scans[index].thing.category, scans[index].file) for index in shuffled[side::2]) for side in (0, 1)]
+        new = [
+            [Job(Thing(name, instances, seed), memory[:held], looks, rate, backbone) for held, (name, _) in enumerate(memory)]
+            for memory in memories
+        ]
+        found = iter(map_jobs(first_met, [job for jobs in new for job in jobs], lambda job: 1, "meeting what is new"))
+        pasts = [tuple(decision for decision in islice(found, len(jobs)) if decision) for jobs in new]
         things = [Thing(name, number, seed) for name in names for number in range(instances)]
-        jobs = [Job(thing, memory, looks, rate, backbone) for memory in memories for thing in things]
+        jobs = [Job(thing, memory, looks, rate, backbone, past) for memory, past in zip(memories, pasts) for thing in things]
         cases = map_jobs(meet, jobs, lambda job: 1, "meeting")
     rows = summary(cases)
     if json is not None:
@@ -153,6 +163,16 @@ def learn(scan: Scan) -> None:
     _, world = scan.thing.enter()
     views = [world.capture(pose) for pose in around(world.objects[0], SCANNED, np.random.default_rng([scan.thing.seed, 1]))]
     np.savez(scan.file, allow_pickle=False, **burst_as_arrays(_encode(views, scan.backbone)))
+
+
+def first_met(job: Job) -> Decision | None:
+    """What the memory takes an object of a new category for, and is told that it is new; None where no object was seen."""
+    _, world = job.thing.enter()
+    views = [world.capture(pose) for pose in one_side(world, job.looks, job.thing.seed)]
+    try:
+        return Memory(job).decide(_encode(views, job.backbone)).corrected(job.thing.category)
+    except NoObject:
+        return None
 
 
 def meet(job: Job) -> Case:
@@ -195,11 +215,11 @@ def verdict(decision: Decision, category: str, held: bool) -> str:
 
 
 class Memory:
-    """Decides as the service does while it has met nothing but what it was taught."""
+    """Decides as the service does once it has met and learnt its members, and nothing else."""
 
     def __init__(self, job: Job) -> None:
         self._encoder = _encoder(job.backbone)
-        self._rate = job.rate
+        self._rate, self._past = job.rate, job.past
         self._scans = dict(job.memory)
         self._members = [_member(category, file) for category, file in job.memory]
         self._laid: dict[str, Candidate] = {}
@@ -219,7 +239,8 @@ class Memory:
             self._laid[category] = Candidate(reference, estimate.target_from_reference)
             return found
 
-        return decide(self._members, encoded, DecisionConfig(false_known_rate=self._rate, looks=looks), Context(whitening, verify=explain))
+        config = DecisionConfig(false_known_rate=self._rate, looks=looks)
+        return decide(self._members, encoded, config, Context(whitening, self._past, explain))
 
     def viewpoints(self, encoded: EncodedBurst, decision: Decision) -> FloatArray:
         """Those offered with the decision just made, shape (n, 4, 4)."""

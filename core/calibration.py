@@ -110,9 +110,13 @@ class Calibration:
         return self.location + self.spread * float(stdtrit(self.freedom, 1 - rate)) * float(np.sqrt(1 + 1 / (self.freedom + 1)))
 
     def levels(self, rate: float, looks: int = 0) -> Levels:
-        """The thresholds of a rate; each look that was taken for no other reason than doubt leaves less room for doubt."""
+        """The thresholds of a rate.
+
+        Each look that was taken for no other reason than doubt leaves less room for doubt, and none for what is more probably wrong.
+        """
         uncertain_factor = UNCERTAIN_FACTOR ** (1 / (1 + looks))
-        return Levels(*(self.threshold(min(factor * rate, LARGEST_RATE)) for factor in (1.0, uncertain_factor, LEARN_FACTOR)))
+        known, uncertain, learn = (self.threshold(min(factor * rate, LARGEST_RATE)) for factor in (1.0, uncertain_factor, LEARN_FACTOR))
+        return Levels(known, min(max(uncertain, self.even), known) if looks else uncertain, learn)
 
     def probability(self, evidence: float) -> float:
         """That the most similar category is right, with even odds beforehand; grows with the evidence."""
