@@ -22,7 +22,6 @@ from benchmarks.parallel import map_jobs
 from benchmarks.tables import Row, print_table, write_json
 from clients.simulator.raycast.categories import RECIPES
 from clients.simulator.raycast.export import around
-from clients.simulator.raycast.model import Model
 from clients.simulator.raycast.world import RaycastWorld
 from core.backbones import EMBEDDED, load_backbone
 from core.camera_poses import angles_about_deg
@@ -54,12 +53,11 @@ class Thing:
     number: int
     seed: int
 
-    def enter(self) -> tuple[Model, RaycastWorld]:
-        """The model, and the world with it on the table."""
-        model = RECIPES[self.category].make(self.category, self.number)
+    def enter(self) -> RaycastWorld:
+        """The world with it on the table."""
         world = RaycastWorld(int(np.random.default_rng([self.seed, self.number, sum(map(ord, self.category))]).integers(1 << 30)))
-        world.show([model])
-        return model, world
+        world.show([RECIPES[self.category].make(self.category, self.number)])
+        return world
 
 
 @dataclass(frozen=True)
@@ -160,15 +158,14 @@ def _row(name: str, cases: int, tried: int, answers: Sequence[str | None]) -> Ro
 
 def learn(scan: Scan) -> None:
     """Looks at an object from all sides and writes what it encodes to."""
-    _, world = scan.thing.enter()
+    world = scan.thing.enter()
     views = [world.capture(pose) for pose in around(world.objects[0], SCANNED, np.random.default_rng([scan.thing.seed, 1]))]
     np.savez(scan.file, allow_pickle=False, **burst_as_arrays(_encode(views, scan.backbone)))
 
 
 def first_met(job: Job) -> Decision | None:
     """What the memory takes an object of a new category for, and is told that it is new; None where no object was seen."""
-    _, world = job.thing.enter()
-    views = [world.capture(pose) for pose in one_side(world, job.looks, job.thing.seed)]
+    _, views = first_views(job)
     try:
         return Memory(job).decide(_encode(views, job.backbone)).corrected(job.thing.category)
     except NoObject:
@@ -177,9 +174,8 @@ def first_met(job: Job) -> Decision | None:
 
 def meet(job: Job) -> Case:
     """See `Case`."""
-    _, world = job.thing.enter()
+    world, views = first_views(job)
     held = any(category == job.thing.category for category, _ in job.memory)
-    views = [world.capture(pose) for pose in one_side(world, job.looks, job.thing.seed)]
     memory = Memory(job)
     try:
         encoded = _encode(views, job.backbone)
@@ -200,10 +196,12 @@ def meet(job: Job) -> Case:
     return Case(job.thing.category, held, first, after(offered[0]), tuple(after(among[index]) for index in drawn))
 
 
-def one_side(world: RaycastWorld, looks: int, seed: int) -> list[FloatArray]:
-    """Neighbouring poses of those that a robot looks from before it is asked."""
-    poses = np.stack(world.viewpoints(AROUND, seed))
-    return list(poses[np.argsort(angles_about_deg(poses[:1, :3, 3], poses[:, :3, 3], world.center_m)[0])[:looks]])
+def first_views(job: Job) -> tuple[RaycastWorld, list[View]]:
+    """The world with the object in it, and its views from neighbouring poses of those that a robot looks from before it is asked."""
+    world = job.thing.enter()
+    poses = np.stack(world.viewpoints(AROUND, job.thing.seed))
+    nearest = np.argsort(angles_about_deg(poses[:1, :3, 3], poses[:, :3, 3], world.center_m)[0])
+    return world, [world.capture(pose) for pose in poses[nearest[: job.looks]]]
 
 
 def verdict(decision: Decision, category: str, held: bool) -> str:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import yaml
-from pydantic import ConfigDict, Field, StrictBool, StrictInt, TypeAdapter, ValidationError
+from pydantic import ConfigDict, Field, StrictBool, StrictFloat, StrictInt, TypeAdapter, ValidationError
 
 from clients.datasets.folders import by_category
 from clients.datasets.samples import data_or_samples
@@ -35,9 +35,9 @@ class Faults:
 
     __pydantic_config__ = NO_OTHERS
 
-    lost_views: Annotated[float, Field(ge=0, lt=1)] = 0.0
+    lost_views: Annotated[StrictFloat, Field(ge=0, lt=1)] = 0.0
     """Share of views that never arrive."""
-    sensor: Mapping[str, float] = field(default_factory=dict)
+    sensor: Mapping[str, StrictFloat] = field(default_factory=dict)
     """Settings of the rendered world's camera, such as `disparity_noise_px: 0.3`."""
 
 

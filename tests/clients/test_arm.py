@@ -19,6 +19,8 @@ class EmptyWorld:
 
     objects: list[WorldObject] = []
     center_m = CENTER_M
+    captured = 0
+    """Views taken."""
 
     def viewpoints(self, count: int, seed: int) -> list[FloatArray]:
         """All around."""
@@ -26,6 +28,7 @@ class EmptyWorld:
 
     def capture(self, world_from_camera: FloatArray) -> View:
         """From exactly there."""
+        self.captured += 1
         return View(np.full((40, 40, 3), 128, np.uint8), camera=Camera(K, world_from_camera))
 
 

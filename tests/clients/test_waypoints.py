@@ -80,13 +80,15 @@ def test_each_view_is_asked_for_by_itself_of_the_known_category_without_learning
 
 
 def test_what_is_out_of_reach_is_left_out_and_counted_and_motion_takes_time() -> None:
-    arm = Arm(EmptyWorld(), ArmConfig(limits=Limits(reach_m=(0.28, 0.6))))
+    world = EmptyWorld()
+    arm = Arm(world, ArmConfig(limits=Limits(reach_m=(0.28, 0.6))))
     looked = arm.glance(8, 0)
-    clock_s = arm.clock_s
+    clock_s, captured = arm.clock_s, world.captured
     visited = visit_waypoints(Service(), arm, Answer(0), looked, 30, 5, lambda _: None)  # type: ignore[arg-type]
     assert visited.waypoints
     assert visited.out_of_reach > 0
     assert len(visited.waypoints) + visited.out_of_reach == 30
+    assert world.captured - captured == len(visited.waypoints)
     assert arm.clock_s > clock_s + arm.config.settle_s * len(visited.waypoints)
     assert all(arm.cannot_reach(np.array(each.world_from_camera)) is None for each in visited.waypoints)
 

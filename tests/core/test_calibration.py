@@ -56,13 +56,18 @@ def test_one_rate_makes_three_levels_and_a_look_narrows_the_room_for_doubt() -> 
     assert calibration.threshold(0.2) < looked.uncertain_above < looked.known_above == asked.known_above
 
 
-@pytest.mark.parametrize("own", [1.4, 2.25])
-def test_after_a_look_nothing_is_uncertain_that_is_more_probably_wrong(own: float) -> None:
-    calibration = Calibration.fit([], Samples(PRIOR.rivals, (own,)))
+def test_after_a_look_nothing_is_uncertain_that_is_more_probably_wrong() -> None:
+    calibration = Calibration.fit([], Samples(PRIOR.rivals, (1.4,)))
     asked, looked = calibration.levels(0.02), calibration.levels(0.02, looks=1)
     assert calibration.probability(asked.uncertain_above) < 0.5
-    assert looked.uncertain_above == looked.known_above or calibration.probability(looked.uncertain_above) >= 0.5
-    assert looked.known_above == asked.known_above
+    assert asked.uncertain_above < looked.uncertain_above == calibration.even < looked.known_above == asked.known_above
+
+
+def test_where_the_threshold_is_more_probably_wrong_a_look_leaves_no_doubt() -> None:
+    calibration = Calibration.fit([], Samples(PRIOR.rivals, (2.25,)))
+    asked, looked = calibration.levels(0.02), calibration.levels(0.02, looks=1)
+    assert calibration.probability(asked.known_above) < 0.5
+    assert looked.uncertain_above == looked.known_above == asked.known_above
 
 
 def test_doubt_ends_at_the_median_of_what_is_wrong() -> None:
