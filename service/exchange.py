@@ -82,6 +82,6 @@ def _again(request: Request, earlier: Earlier, route: str) -> Response:
     if reply is None:
         assert earlier.result_id is not None, "what changed nothing is not kept"
         app = running(request)
-        made = app.made[route](app.agent, earlier.result_id)
+        made = app.made[route](app.agent, earlier.result_id, request.query_params)
         reply = Reply(200, "application/json", made.model_dump_json(by_alias=True).encode())
     return Response(reply.body, reply.status, {REPEATED: "true"}, reply.media_type)

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from pydantic import BaseModel
+from starlette.datastructures import QueryParams
 from starlette.requests import HTTPConnection
 
 from core.warm import WarmConfig
@@ -16,8 +17,10 @@ from service.metrics import Metrics
 from service.settings import Settings
 from service.work import WorkQueue
 
-Made = Mapping[str, Callable[[Agent, str], BaseModel]]
-"""By the path of a route: what it answers, from the id of what a request made."""
+MadeAnswer = Callable[[Agent, str, QueryParams], BaseModel]
+"""What a route answers, from the id of what a request made and the options of that request."""
+Made = Mapping[str, MadeAnswer]
+"""By the path of the route."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
+from pydantic import BaseModel
+from starlette.datastructures import QueryParams
+
 from core.reference import MIN_VIEWS
 from service.agent import Agent
 from service.features import pose_details_from_arrays
@@ -9,6 +14,7 @@ from service.schemas.categories import Category
 from service.schemas.goals import Goal
 from service.schemas.observations import Debug, Observation
 from service.schemas.scans import Scan
+from service.state import MadeAnswer
 from store import records
 
 
@@ -42,6 +48,15 @@ def category(agent: Agent, category_id: str) -> Category:
 def goal(agent: Agent, goal_id: str) -> Goal:
     """Raises NotFound."""
     return Goal.of(agent.memory.goals.get(goal_id))
+
+
+def by_id(answer: Callable[[Agent, str], BaseModel]) -> MadeAnswer:
+    """For an answer that no option changes."""
+
+    def made(agent: Agent, made_id: str, query: QueryParams) -> BaseModel:
+        return answer(agent, made_id)
+
+    return made
 
 
 def _debug(agent: Agent, observation_id: str) -> Debug | None:

@@ -9,7 +9,7 @@ from fastapi import APIRouter, Path, Response
 from service.deps import ActorDep, AgentDep, WorkDep
 from service.exchange import MemoryRoute
 from service.gallery import CategoryGallery
-from service.routes.answers import category
+from service.routes.answers import by_id, category
 from service.routes.png import PNG_RESPONSES, Side, png
 from service.schemas.categories import (
     Category,
@@ -138,5 +138,5 @@ def category_cloud(category_id: str, agent: AgentDep) -> Response:
     )
 
 
-MADE = {"/v1/categories/{category_id}/merge": category, "/v1/categories/{category_id}/split": category}
+MADE = {"/v1/categories/{category_id}/merge": by_id(category), "/v1/categories/{category_id}/split": by_id(category)}
 """What a repeated request is answered with where its first answer was lost."""

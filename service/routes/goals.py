@@ -9,7 +9,7 @@ from fastapi import APIRouter, Depends, Query
 
 from service.deps import AgentDep, Source, WorkDep, read_source
 from service.exchange import MemoryRoute
-from service.routes.answers import goal
+from service.routes.answers import by_id, goal
 from service.schemas.bursts import burst_or
 from service.schemas.goals import Goal, GoalList, GoalQuery, Plan, PlanQuery, Seen
 from service.schemas.problem import problems
@@ -68,5 +68,5 @@ async def plan(goal_id: str, source: SourceDep, query: Annotated[PlanQuery, Quer
     return await work.run(planned)
 
 
-MADE = {"/v1/categories/{category_id}/goals": goal}
+MADE = {"/v1/categories/{category_id}/goals": by_id(goal)}
 """What a repeated request is answered with where its first answer was lost."""

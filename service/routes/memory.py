@@ -15,6 +15,7 @@ from service.deps import ActorDep, AgentDep, SettingsDep, WorkDep
 from service.exchange import MemoryRoute
 from service.guarded import GuardedRoute
 from service.limits import media_type
+from service.routes.answers import by_id
 from service.schemas.memory import AuditEntry, AuditList, Backup, Calibrate, ExportQuery, Import, MemoryInfo, Thresholds
 from service.schemas.problem import problems
 
@@ -97,7 +98,7 @@ def change(agent: Agent, entry_id: str) -> AuditEntry:
     return AuditEntry.of(agent.memory.audit.get(entry_id))
 
 
-MADE = {"/v1/memory/import": imported, "/v1/memory/audit/{entry_id}/undo": change}
+MADE = {"/v1/memory/import": by_id(imported), "/v1/memory/audit/{entry_id}/undo": by_id(change)}
 """What a repeated request is answered with where its first answer was lost."""
 
 

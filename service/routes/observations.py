@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Response
+from starlette.datastructures import QueryParams
 
 from core.errors import InvalidInput
 from core.novelty import Outcome
@@ -13,7 +14,7 @@ from service.agent import Agent
 from service.deps import ActorDep, AgentDep, UploadDep, WorkDep
 from service.exchange import MemoryRoute
 from service.gallery import ObservationGallery
-from service.routes.answers import observation, observation_answer
+from service.routes.answers import by_id, observation, observation_answer
 from service.routes.png import PNG_RESPONSES, Side, png
 from service.schemas.bursts import BURST_BODY
 from service.schemas.observations import AnswerQuery, Correction, NewObservationQuery, Observation, ObservationList
@@ -115,5 +116,10 @@ def _as_asked(agent: Agent, seen: records.Observation, query: AnswerQuery) -> Sh
     return observation_answer(agent, seen, debug="debug" in query.include)
 
 
-MADE = {"/v1/observations": observation, "/v1/observations/{observation_id}/correct": observation}
+def _observed(agent: Agent, observation_id: str, query: QueryParams) -> Shown:
+    asked = AnswerQuery(include=query.getlist("include"), format=query.get("format", "onelook"))
+    return _as_asked(agent, agent.memory.observations.get(observation_id), asked)
+
+
+MADE = {"/v1/observations": _observed, "/v1/observations/{observation_id}/correct": by_id(observation)}
 """What a repeated request is answered with where its first answer was lost."""

@@ -9,7 +9,7 @@ from fastapi import APIRouter, Depends, Query
 
 from service.deps import ActorDep, AgentDep, Source, UploadDep, WorkDep, read_source
 from service.exchange import MemoryRoute
-from service.routes.answers import category, scan, scan_answer
+from service.routes.answers import by_id, category, scan, scan_answer
 from service.schemas.bursts import BURST_BODY, burst_or
 from service.schemas.categories import Category
 from service.schemas.problem import problems
@@ -68,9 +68,9 @@ async def complete_scan(scan_id: str, agent: AgentDep, work: WorkDep, actor: Act
 
 
 MADE = {
-    "/v1/scans": scan,
-    "/v1/scans/{scan_id}/exclude": scan,
-    "/v1/scans/{scan_id}/views": scan,
-    "/v1/scans/{scan_id}/complete": category,
+    "/v1/scans": by_id(scan),
+    "/v1/scans/{scan_id}/exclude": by_id(scan),
+    "/v1/scans/{scan_id}/views": by_id(scan),
+    "/v1/scans/{scan_id}/complete": by_id(category),
 }
 """What a repeated request is answered with where its first answer was lost."""

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import re
 import threading
+from pathlib import Path
 
 import pytest
 from fastapi.testclient import TestClient
 
 from service.app import create_app
 from service.exchange import MemoryRoute
+from service.guarded import GuardedRoute
 from service.routes.install import MADE, ROUTERS
 from tests.service.conftest import LONG_S, Gate
 
+ROOT = Path(__file__).parents[2]
 KEY = {"Idempotency-Key": "4f1c"}
 
 
@@ -90,6 +94,16 @@ def test_an_answer_lost_with_the_process_is_made_again_from_what_was_kept(client
     assert len(observations(client)) == 1
 
 
+@pytest.mark.parametrize("asked", [{"format": "vision_msgs"}, {"include": "debug"}])
+def test_an_answer_lost_with_the_process_comes_again_in_the_shape_that_was_asked_for(client, ball, look, parts, asked):
+    asked |= {"category_id": ball["id"]}
+    first = client.post("/v1/observations", files=parts(look()), params=asked, headers=KEY).json()
+    lose_answers(client)
+    again = client.post("/v1/observations", files=parts(look()), params=asked, headers=KEY)
+    assert first.get("detections") or first.get("debug")
+    assert (again.status_code, again.json()) == (200, first)
+
+
 def test_whatever_is_made_can_be_answered_again():
     made = {
         route.path_format for router in ROUTERS for route in router.routes if isinstance(route, MemoryRoute) and route.status_code == 201
@@ -147,6 +161,13 @@ def test_an_unchanged_read_is_not_sent_again(client, ball):
         answer = client.get(path)
         unchanged = client.get(path, headers={"If-None-Match": answer.headers["etag"]})
         assert (unchanged.status_code, unchanged.content) == (304, b""), path
+
+
+def test_the_page_names_the_reads_that_have_no_tag():
+    reads = [route for router in ROUTERS for route in router.routes if isinstance(route, GuardedRoute) and "GET" in route.methods]
+    untagged = {route.path for route in reads if route.path.startswith("/v1/") and not isinstance(route, MemoryRoute)}
+    paragraph = (ROOT / "docs" / "http.md").read_text().partition("**Reading again.**")[2].partition("\n\n")[0]
+    assert untagged == set(re.findall(r"`(/v1/\w+)`", paragraph))
 
 
 def test_a_change_makes_another_tag(client, learn):
