@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from core.encode import EncodedView
 from core.views import Camera, FloatArray, View
 
-Fault = Literal["out_of_view", "cut_off", "blur", "little_depth", "elsewhere", "copy", "contradicted"]
+FaultKind = Literal["out_of_view", "cut_off", "blur", "little_depth", "elsewhere", "copy", "contradicted"]
 SIDE = 192
 """Pixels a side that a region is resampled to before its sharpness is judged, so that resolution does not matter."""
 LEAST_SHARPNESS = 0.4
@@ -32,7 +32,7 @@ LEAST_DEPTH = 0.5
 class ViewFault:
     """What is wrong with one view; it is used all the same."""
 
-    kind: Fault
+    kind: FaultKind
     detail: str
     """What was found and what would be better."""
 

@@ -13,13 +13,14 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 import pytest
 from hypothesis import settings
 
 from core.backbones.base import Backbone, Features, shown_patches
+from core.camera_poses import hemisphere
 from core.sim3 import Sim3
 from core.views import Burst, Camera, View
 
@@ -30,6 +31,10 @@ if TYPE_CHECKING:
 
 settings.register_profile("repeatable", derandomize=True, deadline=None, database=None)
 settings.load_profile("repeatable")
+
+HALF_AXES_M = np.array([0.10, 0.07, 0.05])
+COLOURS = {"bright": (190, 60), "dark": (80, 40)}
+"""Middle and amplitude of the colours of two kinds of object."""
 
 
 class ColourBackbone:
@@ -132,6 +137,20 @@ def colour_backbone() -> ColourBackbone:
 def ellipsoid() -> type[Ellipsoid]:
     """The object of the synthetic world."""
     return Ellipsoid
+
+
+@pytest.fixture(scope="session")
+def look() -> Callable[..., Burst]:
+    """look(kind, views=…, world_from_object=…, poses=…): a burst around an object, or from these camera poses."""
+
+    def burst(kind: str = "bright", views: int = 6, world_from_object: Sim3 | None = None, poses: Any = None) -> Burst:
+        placed = world_from_object or Sim3.identity()
+        if poses is None:
+            poses = hemisphere(placed.translation, np.array([0.0, 0.0, 1.0]), 0.5 * placed.scale, views)
+        shown = Ellipsoid(HALF_AXES_M, COLOURS[kind])
+        return Burst([shown.view(placed, pose) for pose in poses])
+
+    return burst
 
 
 @pytest.fixture(scope="session")

@@ -12,7 +12,7 @@ from core import grounds, quality
 class Fault(BaseModel):
     """What is wrong with one view; it is used all the same."""
 
-    kind: quality.Fault
+    kind: quality.FaultKind
     detail: str = Field(description="What was found and what would be better.")
 
     @staticmethod

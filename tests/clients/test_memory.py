@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import json
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
 import pytest
 from typer.testing import CliRunner, Result
 
 from clients.cli import app
 from core import backbones
 from core.backbones.base import Backbone
-from core.camera_poses import look_at
 from core.encode import Encoder
 from core.reference import build_reference
-from core.sim3 import Sim3
 from core.views import Burst
 from store.memory import Memory
 
@@ -115,9 +113,10 @@ def test_a_memory_is_read_but_not_changed_beside_the_service(data_dir: Path, tmp
             assert (refused.exit_code, "open in another process" in refused.output) == (1, True)
 
 
-def test_another_backbone_computes_it_anew(tmp_path: Path, backbone: Backbone, ellipsoid: type, monkeypatch: pytest.MonkeyPatch) -> None:
-    cameras = [look_at(np.array(position), np.zeros(3), np.array([0.0, 0, 1])) for position in ((0.6, 0, 0.4), (0, 0.6, 0.4))]
-    burst = Burst([ellipsoid(np.array([0.05, 0.08, 0.1])).view(Sim3.identity(), camera) for camera in cameras])
+def test_another_backbone_computes_it_anew(
+    tmp_path: Path, backbone: Backbone, look: Callable[..., Burst], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    burst = look(views=2)
     encoded = Encoder(backbone).encode(burst)
     with Memory.open(tmp_path) as learnt:
         learnt.require_backbone("first", "first-1")

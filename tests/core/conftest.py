@@ -6,8 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from core.affine9 import Affine9
 from core.camera_poses import hemisphere
 from core.crop import Window
 from core.encode import EncodedBurst, EncodedView
@@ -70,6 +72,24 @@ class PaintedObject:
             self.descriptors[seen].mean(axis=0),
             camera,
         )
+
+
+@st.composite
+def similarities(draw: st.DrawFn) -> Sim3:
+    """Of objects up to five times as large or small."""
+    numbers = st.floats(-5, 5)
+    rotation = Rotation.from_rotvec([draw(numbers) for _ in range(3)]).as_matrix()
+    return Sim3(draw(st.floats(0.2, 5)), rotation, np.array([draw(numbers) for _ in range(3)]))
+
+
+def same(first: Sim3 | Affine9, second: Sim3 | Affine9, tolerance: float = 1e-8) -> bool:
+    """Whether two transforms are one but for rounding."""
+    return bool(np.allclose(first.as_matrix(), second.as_matrix(), atol=tolerance))
+
+
+def turned(angle_deg: float) -> Sim3:
+    """About the vertical axis."""
+    return Sim3(1.0, Rotation.from_euler("z", angle_deg, degrees=True).as_matrix(), np.zeros(3))
 
 
 @pytest.fixture

@@ -12,25 +12,15 @@ from core.affine9 import Affine9, fit_affine9
 from core.errors import InvalidInput, NoPose
 from core.sim3 import Sim3, umeyama
 
-numbers = st.floats(-5, 5)
-factors = st.floats(0.3, 3)
+from .conftest import same, similarities
+
 POINTS = np.random.default_rng(0).normal(size=(40, 3)) * np.array([1.0, 0.6, 0.4]) + np.array([0.3, -0.2, 0.1])
-
-
-@st.composite
-def similarities(draw: st.DrawFn) -> Sim3:
-    rotation = Rotation.from_rotvec([draw(numbers) for _ in range(3)]).as_matrix()
-    return Sim3(draw(factors), rotation, np.array([draw(numbers) for _ in range(3)]))
 
 
 @st.composite
 def transforms(draw: st.DrawFn) -> Affine9:
     placed = draw(similarities())
-    return Affine9(np.array([draw(factors) for _ in range(3)]), placed.rotation, placed.translation)
-
-
-def same(first: Affine9, second: Affine9, tolerance: float = 1e-7) -> bool:
-    return bool(np.allclose(first.as_matrix(), second.as_matrix(), atol=tolerance))
+    return Affine9(np.array([draw(st.floats(0.3, 3)) for _ in range(3)]), placed.rotation, placed.translation)
 
 
 def error(transform: Affine9, source: np.ndarray, target: np.ndarray) -> float:

@@ -17,16 +17,9 @@ from core.views import Burst, Camera
 UP = np.array([0.0, 0.0, 1.0])
 
 
-@pytest.fixture
-def look(ellipsoid):
-    """look(at, views, color): a burst around an object."""
-
-    def burst(at=(0.0, 0.0, 0.0), views=5, colour=(190, 60)):
-        placed = Sim3(1.0, np.eye(3), np.array(at))
-        poses = hemisphere(placed.translation, UP, 0.5, views)
-        return Burst([ellipsoid(np.array([0.1, 0.07, 0.05]), colour).view(placed, pose) for pose in poses])
-
-    return burst
+def at(x, y, z):
+    """Where an object stands."""
+    return Sim3(1.0, np.eye(3), np.array([x, y, z]))
 
 
 def with_translations(burst, times):
@@ -45,9 +38,9 @@ def with_depth(burst, times):
 
 
 @pytest.mark.parametrize("views", [2, 3, 8])
-@pytest.mark.parametrize("at", [(0, 0, 0), (3, -2, 1)])
-def test_metres_throughout_are_one_unit(look, backbone, views, at):
-    require_one_unit(Encoder(backbone).encode(look(at, views)))
+@pytest.mark.parametrize("place", [at(0, 0, 0), at(3, -2, 1)], ids=["origin", "far"])
+def test_metres_throughout_are_one_unit(look, backbone, views, place):
+    require_one_unit(Encoder(backbone).encode(look(views=views, world_from_object=place)))
 
 
 @pytest.mark.parametrize(
@@ -58,20 +51,18 @@ def test_another_unit_of_cameras_or_of_depth_is_refused(look, backbone, change, 
         require_one_unit(Encoder(backbone).encode(change(look(), times)))
 
 
-def test_views_from_one_side_do_not_tell(look, backbone, ellipsoid):
+def test_views_from_one_side_do_not_tell(look, backbone):
     """Rays that are nearly parallel meet anywhere."""
     pose = hemisphere(np.zeros(3), UP, 0.5, 1)[0]
     beside = pose.copy()
     beside[:3, 3] += 0.005 * pose[:3, 0]
-    shown = ellipsoid(np.array([0.1, 0.07, 0.05]))
-    burst = Burst([shown.view(Sim3.identity(), each) for each in (pose, beside)])
-    require_one_unit(Encoder(backbone).encode(with_depth(burst, 5)))
+    require_one_unit(Encoder(backbone).encode(with_depth(look(poses=[pose, beside]), 5)))
 
 
 def test_one_view_and_views_without_depth_do_not_tell(look, backbone):
     encoder = Encoder(backbone)
     require_one_unit(encoder.encode(look(views=1)))
-    flat = Burst([replace(each, depth_m=None) for each in look().views])
+    flat = Burst([replace(each, depth_m=None) for each in look(views=5).views])
     require_one_unit(encoder.encode(flat))
     assert incoherent(flat, encoder.encode(flat)) == ((),) * 5
 
@@ -89,7 +80,7 @@ def test_cameras_at_one_place_that_look_elsewhere_do_not_tell(look, backbone):
 
 
 def test_a_view_of_something_elsewhere_is_named(look, backbone):
-    mixed = Burst(look(views=4).views + look((1.0, 0, 0), 1, colour=(80, 40)).views)
+    mixed = Burst(look(views=4).views + look("dark", views=1, world_from_object=at(1, 0, 0)).views)
     encoded = Encoder(backbone).encode(mixed)
     *rest, odd = incoherent(mixed, encoded)
     assert rest == [()] * 4

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
-from core.descriptors import PcaBasis, unit
+from core.descriptors import PcaBasis, component_count, unit
+from core.errors import InvalidInput
 
 
 def test_the_first_component_is_the_stretched_axis() -> None:
@@ -27,3 +29,12 @@ def test_fewer_tokens_than_components() -> None:
 
 def test_unit_leaves_zero_alone() -> None:
     assert np.array_equal(unit(np.array([[0.0, 0.0], [3.0, 4.0]], np.float32)), np.array([[0, 0], [0.6, 0.8]], np.float32))
+
+
+def test_the_size_of_a_token_asks_for_whole_tokens() -> None:
+    assert [component_count(dims, 384) for dims in (32, 384, None)] == [32, None, None]
+
+
+def test_more_components_than_are_kept_are_refused() -> None:
+    with pytest.raises(InvalidInput, match="^dims: expected 1 to 64, or 384 for whole tokens, found 65$"):
+        component_count(65, 384)

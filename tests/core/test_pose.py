@@ -9,10 +9,9 @@ import pytest
 
 from core.correspond import METHODS
 from core.encode import EncodedBurst
-from core.errors import InvalidInput, TooFewViews
+from core.errors import InvalidInput
 from core.estimators import ESTIMATORS
 from core.pose import VARIANTS, PoseConfig, PoseEstimator, PoseOptions
-from core.reference import Reference
 from core.sim3 import Sim3, rotation_angle_deg
 
 from .conftest import PaintedObject, blind
@@ -146,11 +145,6 @@ def test_a_single_target_view_is_enough(painted: PaintedObject, moved: Sim3) -> 
     assert_recovered(PoseEstimator().estimate(reference, painted.encode(1, moved)).target_from_reference, moved)
 
 
-def test_a_reference_needs_two_views(painted: PaintedObject) -> None:
-    with pytest.raises(TooFewViews, match="at least 2 views"):
-        painted.reference(1)
-
-
 def test_a_target_without_depth_is_refused(painted: PaintedObject) -> None:
     with pytest.raises(InvalidInput, match="depth"):
         PoseEstimator().estimate(painted.reference(4), blind(painted.encode(2)))
@@ -165,12 +159,3 @@ def test_tokens_of_another_backbone_are_refused(painted: PaintedObject) -> None:
 def test_an_unknown_variant_is_named() -> None:
     with pytest.raises(InvalidInput, match="ucd"):
         PoseConfig.named("nonsense")
-
-
-def test_a_reference_survives_its_arrays(painted: PaintedObject, moved: Sim3) -> None:
-    reference = painted.reference(4)
-    again = Reference.from_arrays(reference.as_arrays())
-    target = painted.encode(3, moved)
-    first, second = (PoseEstimator().estimate(each, target).target_from_reference for each in (reference, again))
-    assert rotation_angle_deg(first.rotation, second.rotation) < 0.5
-    assert np.allclose(again.box.corners(), reference.box.corners())

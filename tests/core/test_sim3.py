@@ -5,26 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from hypothesis import given
-from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from core.errors import InvalidInput, NoPose
 from core.sim3 import Sim3, rotation_angle_deg, umeyama
 
-numbers = st.floats(-5, 5)
-
-
-@st.composite
-def similarities(draw: st.DrawFn) -> Sim3:
-    rotation = Rotation.from_rotvec([draw(numbers) for _ in range(3)]).as_matrix()
-    return Sim3(draw(st.floats(0.2, 5)), rotation, np.array([draw(numbers) for _ in range(3)]))
-
+from .conftest import same, similarities
 
 POINTS = np.random.default_rng(0).normal(size=(6, 3))
-
-
-def same(first: Sim3, second: Sim3) -> bool:
-    return bool(np.allclose(first.as_matrix(), second.as_matrix(), atol=1e-8))
 
 
 @given(similarities())

@@ -19,30 +19,11 @@ import pytest
 from fastapi.testclient import TestClient
 
 from core.backbones.base import Backbone, Features
-from core.camera_poses import hemisphere
-from core.sim3 import Sim3
 from core.views import Burst
 from service.app import create_app
 from service.settings import Settings
 
 LONG_S = 60.0
-HALF_AXES_M = np.array([0.10, 0.07, 0.05])
-COLOURS = {"bright": (190, 60), "dark": (80, 40)}
-"""Middle and amplitude of the colours of two kinds of object."""
-
-
-@pytest.fixture(scope="session")
-def look(ellipsoid: Any) -> Callable[..., Burst]:
-    """look(kind, views=…, world_from_object=…, poses=…): a burst around an object, or from these camera poses."""
-
-    def burst(kind: str = "bright", views: int = 6, world_from_object: Sim3 | None = None, poses: Any = None) -> Burst:
-        placed = world_from_object or Sim3.identity()
-        if poses is None:
-            poses = hemisphere(placed.translation, np.array([0.0, 0.0, 1.0]), 0.5 * placed.scale, views)
-        shown = ellipsoid(HALF_AXES_M, COLOURS[kind])
-        return Burst([shown.view(placed, pose) for pose in poses])
-
-    return burst
 
 
 @pytest.fixture(scope="session")

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import errno
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from core.backbones.base import Backbone
-from core.camera_poses import look_at
 from core.encode import EncodedBurst, Encoder
 from core.errors import Conflict, Unavailable
 from core.novelty import DecisionConfig, decide
@@ -26,12 +25,9 @@ from tests.store.conftest import KNOWN
 
 
 @pytest.fixture(scope="module")
-def cup(ellipsoid: type) -> Burst:
+def cup(look: Callable[..., Burst]) -> Burst:
     """Four views of an object."""
-    thing = ellipsoid(np.array([0.05, 0.08, 0.1]))
-    up = np.array([0.0, 0, 1])
-    cameras = [look_at(0.6 * np.array([np.cos(angle), np.sin(angle), 0.6]), np.zeros(3), up) for angle in (0.0, 1.5, 3.0, 4.5)]
-    return Burst([thing.view(Sim3.identity(), camera) for camera in cameras])
+    return look(views=4)
 
 
 @pytest.fixture

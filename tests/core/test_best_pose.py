@@ -1,0 +1,34 @@
+"""The variant `best` tells of rivals, and of having found nothing."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from core.encode import EncodedBurst
+from core.errors import NoPose
+from core.pose import VARIANTS, PoseEstimator
+from core.sim3 import Sim3, rotation_angle_deg
+
+from .conftest import PaintedObject, turned
+
+
+def test_an_object_that_looks_the_same_from_behind_has_a_rival(painted: PaintedObject, moved: Sim3) -> None:
+    painted.points = np.concatenate([painted.points, turned(180).apply(painted.points)])
+    painted.descriptors = np.concatenate([painted.descriptors, painted.descriptors])
+    estimate = PoseEstimator(VARIANTS["best"]).estimate(painted.reference(6), painted.encode(4, moved))
+    rival = estimate.alternatives[0]
+    assert estimate.score is not None
+    assert estimate.score * 0.8 < rival.score <= estimate.score
+    assert rotation_angle_deg(rival.target_from_reference.rotation, estimate.target_from_reference.rotation) > 170
+
+
+def test_without_a_match_there_is_no_pose(painted: PaintedObject) -> None:
+    target = painted.encode(2)
+    opposite = EncodedBurst(tuple(replace(view, descriptors=np.zeros_like(view.descriptors)) for view in target.views), target.fingerprint)
+    reference = painted.reference(4)
+    zero_mean = replace(reference.basis, mean=np.zeros_like(reference.basis.mean))
+    with pytest.raises(NoPose, match="no view pair"):
+        PoseEstimator(VARIANTS["best"]).estimate(replace(reference, basis=zero_mean), opposite)
