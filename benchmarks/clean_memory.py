@@ -66,50 +66,56 @@ UNSEEN = Decisions(-np.inf, -np.inf, right=False, nearest=False, uncertain=False
 """Of a burst in which no object was found: the service refuses it."""
 
 
-def lay(known: Known, target: Path, whitening: Whitening | None, seed: int) -> Laid:
-    """The best pose of what the memory holds on the encoding in `target`; kept in the user's cache."""
-    names = f"{code_hash(SOURCES)} {known.file.stem} {known.views} {target.stem} {seed}"
-    file = cache_folder() / "laid" / f"{hashlib.sha256(names.encode()).hexdigest()[:32]}.npz"
-    if not file.exists():
-        laid = _lay(known, consistent_only(read_encoded(target)), whitening, seed)
-        matrix = np.zeros((4, 4)) if laid.target_from_reference is None else laid.target_from_reference.as_matrix()
-        write(file, lambda stream: np.savez(stream, allow_pickle=False, matrix=matrix, agreement=laid.agreement))
-    with np.load(file, allow_pickle=False) as arrays:
-        matrix, found = arrays["matrix"], float(arrays["agreement"])
-    return Laid(Sim3.from_matrix(matrix) if matrix.any() else None, found)
+@dataclass(frozen=True)
+class CleanMemory:
+    """Undegraded bursts, and how they are posed and decided by."""
 
+    bursts: tuple[Known, ...]
+    """The first of a category is its reference."""
+    whitening: Whitening | None
+    seed: int
+    poses: bool
+    """Whether the poses of the likeliest categories' references verify decisions."""
 
-def decide_by(memory: Sequence[Known], category: str, target: Path, whitening: Whitening | None, seed: int, *, poses: bool) -> Decisions:
-    """Decides on the encoding in `target`, of an object of `category`, by `memory`, and by what is left of it without this category.
+    def lay(self, known: Known, target: Path) -> Laid:
+        """The best pose of a burst that the memory holds on the encoding in `target`; kept in the user's cache."""
+        names = f"{code_hash(SOURCES)} {known.file.stem} {known.views} {target.stem} {self.seed}"
+        file = cache_folder() / "laid" / f"{hashlib.sha256(names.encode()).hexdigest()[:32]}.npz"
+        if not file.exists():
+            laid = _lay(known, consistent_only(read_encoded(target)), self.whitening, self.seed)
+            matrix = np.zeros((4, 4)) if laid.target_from_reference is None else laid.target_from_reference.as_matrix()
+            write(file, lambda stream: np.savez(stream, allow_pickle=False, matrix=matrix, agreement=laid.agreement))
+        with np.load(file, allow_pickle=False) as arrays:
+            matrix, found = arrays["matrix"], float(arrays["agreement"])
+        return Laid(Sim3.from_matrix(matrix) if matrix.any() else None, found)
 
-    Args:
-        poses: whether the poses of the likeliest categories' first bursts verify.
-    """
-    burst = consistent_only(read_encoded(target))
-    if not any(len(view.cells) for view in burst.views):
-        return UNSEEN
-    founders: dict[str, Known] = {}
-    for known in memory:
-        founders.setdefault(known.category, known)
+    def decide(self, target: Path, category: str) -> Decisions:
+        """On the encoding in `target`, of an object of `category`: by all bursts, and by those that are left without this category."""
+        burst = consistent_only(read_encoded(target))
+        if not any(len(view.cells) for view in burst.views):
+            return UNSEEN
+        references: dict[str, Known] = {}
+        for known in self.bursts:
+            references.setdefault(known.category, known)
 
-    def verify(asked: str) -> float:
-        return lay(founders[asked], target, whitening, seed).agreement
+        def agreement(asked: str) -> float:
+            return self.lay(references[asked], target).agreement
 
-    def decision(known: Sequence[Known]) -> Decision:
-        members = [_member(each) for each in known]
-        return decide(members, burst, context=Context(whitening, verify=verify if poses else None))
+        def decision(bursts: Sequence[Known]) -> Decision:
+            members = [_member(each) for each in bursts]
+            return decide(members, burst, context=Context(self.whitening, verify=agreement if self.poses else None))
 
-    held, without = decision(memory), decision([each for each in memory if each.category != category])
-    nearest = held.similarities[0][0] == category
-    return Decisions(
-        own=dict(held.similarities).get(category, -np.inf),
-        rival=without.similarity if without.similarity is not None else -np.inf,
-        right=held.outcome == "known" and nearest,
-        nearest=nearest,
-        uncertain=held.outcome == "uncertain",
-        novel=held.outcome == "novel",
-        false_known=without.outcome == "known",
-    )
+        held, without = decision(self.bursts), decision([each for each in self.bursts if each.category != category])
+        nearest = held.similarities[0][0] == category
+        return Decisions(
+            own=dict(held.similarities).get(category, -np.inf),
+            rival=without.similarity if without.similarity is not None else -np.inf,
+            right=held.outcome == "known" and nearest,
+            nearest=nearest,
+            uncertain=held.outcome == "uncertain",
+            novel=held.outcome == "novel",
+            false_known=without.outcome == "known",
+        )
 
 
 def _lay(known: Known, burst: EncodedBurst, whitening: Whitening | None, seed: int) -> Laid:

@@ -28,7 +28,7 @@ from benchmarks.pair_scores import PairScores, auroc, hardest, nearest_accuracy,
 from benchmarks.parallel import map_jobs
 from benchmarks.tables import Row, print_table, write_json
 from clients.datasets.sources import find_sequences
-from core.backbones import EMBEDDED, load_backbone
+from core.backbones import load_backbone
 from core.backbones.whitening import Whitening
 from core.calibration import Calibration, Prior
 from core.encode import EncodedBurst, Encoder
@@ -87,12 +87,13 @@ def run(
     data: Path,
     scores: Sequence[str],
     json: Path | None,
-    episodes: int = 1000,
-    length: int = 250,
-    seed: int = 0,
-    backbone: str = EMBEDDED,
-    picture: Path | None = None,
-    poses: bool = True,
+    *,
+    episodes: int,
+    length: int,
+    seed: int,
+    backbone: str,
+    picture: Path | None,
+    poses: bool,
 ) -> list[Row]:
     """Runs `episodes` episodes of `length` bursts of `data` for every score (all of them where none is named).
 

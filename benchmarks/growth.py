@@ -93,14 +93,15 @@ def run(
     fill: Fill,
     measure: Measure,
     json: Path | None,
-    plot: Path | None = None,
-    categories: Sequence[int] = (10, 100, 1000, 10_000),
-    views: int = 10,
-    rounds: int = 40,
-    exact_up_to: int = 1000,
-    data: Path | None = None,
-    backbone: str = EMBEDDED,
-    seed: int = 0,
+    plot: Path | None,
+    *,
+    categories: Sequence[int],
+    views: int,
+    rounds: int,
+    exact_up_to: int,
+    data: Path | None,
+    backbone: str,
+    seed: int,
 ) -> list[GrowthRow]:
     """A row for each size; prints a table.
 

@@ -18,7 +18,7 @@ from benchmarks.encoded import encode_all, read_encoded
 from benchmarks.tables import report
 from clients.datasets import folders
 from clients.datasets.sources import find_sequences
-from core.backbones import EMBEDDED, load_backbone
+from core.backbones import load_backbone
 from core.encode import EncodedView, Encoder, EncoderConfig
 from core.errors import InvalidInput
 
@@ -48,13 +48,7 @@ MEAN_COLUMNS = ("iou", "precision", "recall", "missed")
 MISSED_RECALL = 0.1
 
 
-def run(
-    data: Path,
-    json: Path | None,
-    sources: Sequence[str] = SOURCES,
-    limit: int | None = None,
-    backbone: str = EMBEDDED,
-) -> list[IsolationRow]:
+def run(data: Path, json: Path | None, sources: Sequence[str], limit: int | None, backbone: str) -> list[IsolationRow]:
     """Compares `sources` of foreground on up to `limit` sequences a category of `data`; prints and returns the table.
 
     Raises InvalidInput where no sequence has silhouettes, or for a source that the backbone does not have.

@@ -55,13 +55,14 @@ class LoadRow:
 
 def run(
     json: Path | None,
-    plot: Path | None = None,
-    robots: Sequence[int] = (1, 2, 4, 8, 16, 32),
-    seconds: float = 45.0,
-    views: int = 4,
-    data: Path | None = None,
-    url: str | None = None,
-    seed: int = 0,
+    plot: Path | None,
+    *,
+    robots: Sequence[int],
+    seconds: float,
+    views: int,
+    data: Path | None,
+    url: str | None,
+    seed: int,
 ) -> list[LoadRow]:
     """A row for each number of robots; prints a table.
 

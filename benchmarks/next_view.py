@@ -23,7 +23,7 @@ from benchmarks.tables import Row, print_table, write_json
 from clients.simulator.raycast.categories import RECIPES
 from clients.simulator.raycast.export import around
 from clients.simulator.raycast.world import RaycastWorld
-from core.backbones import EMBEDDED, load_backbone
+from core.backbones import load_backbone
 from core.camera_poses import angles_about_deg
 from core.encode import EncodedBurst, Encoder
 from core.errors import InvalidInput, NoObject, NoPose
@@ -101,11 +101,12 @@ class Scan:
 def run(
     json: Path | None,
     categories: Sequence[str],
-    instances: int = 3,
-    looks: int = 2,
-    rate: float = 0.01,
-    seed: int = 0,
-    backbone: str = EMBEDDED,
+    *,
+    instances: int,
+    looks: int,
+    rate: float,
+    seed: int,
+    backbone: str,
 ) -> list[Row]:
     """Meets `instances` objects of each category, all categories of the world where none is named, and prints a table.
 

@@ -54,14 +54,25 @@ def sample_pairs(sequences: Sequence[folders.Sequence], limit: int, seed: int) -
         candidates = [(a, b) for a in group for b in group if a.instance != b.instance]
         order = np.random.default_rng([seed, crc32(category.encode())]).permutation(len(candidates))
         pairs += [candidates[index] for index in order[:limit]]
-    if not pairs:
-        raise InvalidInput("data", "no category has two instances, so there is no pair to estimate")
-    for sequence in {sequence for pair in pairs for sequence in pair}:
-        if sequence.world_from_model is None:
-            raise InvalidInput(
-                str(sequence.path), "has no true pose (scene_gt.json, class_labels), which the pose benchmark scores against"
-            )
+    require_true_poses([sequence for pair in pairs for sequence in pair])
     return pairs
+
+
+def require_true_poses(sequences: Sequence[folders.Sequence]) -> None:
+    """Raises InvalidInput where none is left to be posed against another, or one has no ground truth."""
+    if not sequences:
+        raise InvalidInput("data", "no category has two instances, so there is no pair to estimate")
+    for sequence in sequences:
+        if sequence.world_from_model is None:
+            raise InvalidInput(str(sequence.path), "has no true pose (scene_gt.json, class_labels), which poses are scored against")
+
+
+def require_views(sequences: Sequence[folders.Sequence], counts: Sequence[ViewCounts]) -> None:
+    """Raises InvalidInput for a sequence that has fewer views than one of the counts asks for."""
+    most = max(max(count.reference or 0, count.target or 0) for count in counts)
+    for sequence in sequences:
+        if len(sequence.images) < most:
+            raise InvalidInput("views", f"{most} were asked for, but {sequence.name} has {len(sequence.images)}; ask for fewer")
 
 
 def choose_views(name: str, role: str, available: int, count: int | None, seed: int) -> list[int]:

@@ -13,7 +13,6 @@ from pathlib import Path
 from benchmarks.contenders import Sweep
 from benchmarks.pose import PoseRow, measure
 from benchmarks.tables import report
-from core.backbones import EMBEDDED
 
 FEW, ALL = "10", "all"
 
@@ -95,7 +94,7 @@ TAKEN = ("variant", "views", "pairs", "median_deg", "acc30", "acc15", "acc7_5", 
 """Of ours."""
 
 
-def run(data: Path, limit: int | None, json: Path | None, seed: int = 0, backbone: str = EMBEDDED) -> list[PaperRow]:
+def run(data: Path, limit: int | None, json: Path | None, seed: int, backbone: str) -> list[PaperRow]:
     """Measures every row of both tables on `data`; prints and returns them beside the published ones. See `benchmarks.pose.run`."""
     measured, meta = measure(data, SWEEPS, limit, seed, backbone)
     rows = beside([row for row in measured if row.category == "all"])

@@ -20,16 +20,16 @@ from benchmarks.box_iou import Parallelepiped, box_iou
 from benchmarks.contenders import Found, Setting, Sweep
 from benchmarks.encoded import read_views
 from benchmarks.pair_jobs import encode_pairs, seen_views
-from benchmarks.pairs import Pair, ViewCounts, sample_pairs
+from benchmarks.pairs import Pair, require_views, sample_pairs
 from benchmarks.parallel import map_jobs, worker_count
 from benchmarks.tables import report
 from clients.datasets import folders
 from clients.datasets.sources import find_sequences
 from clients.pose_error import NO_POSE, PoseError, accuracy, median, pose_error, rotation_error_deg
-from core.backbones import EMBEDDED, load_backbone
+from core.backbones import load_backbone
 from core.boxes import remove_outliers
 from core.encode import EncodedBurst, Encoder
-from core.errors import InvalidInput, NoPose
+from core.errors import NoPose
 from core.sim3 import Sim3
 from core.views import FloatArray
 
@@ -111,7 +111,7 @@ MEAN_COLUMNS = COLUMNS[COLUMNS.index("acc30") : COLUMNS.index("method")]
 """What an "all" row averages over categories."""
 
 
-def run(data: Path, sweep: Sweep, limit: int | None, json: Path | None, seed: int = 0, backbone: str = EMBEDDED) -> list[PoseRow]:
+def run(data: Path, sweep: Sweep, limit: int | None, json: Path | None, seed: int, backbone: str) -> list[PoseRow]:
     """Estimates the pairs of `data` under every setting of `sweep`; prints and returns the table.
 
     Args:
@@ -132,7 +132,7 @@ def measure(data: Path, sweeps: Sequence[Sweep], limit: int | None, seed: int, b
     network = load_backbone(backbone)
     settings = [setting for sweep in sweeps for setting in sweep.settings(network.dim)]
     pairs = sample_pairs(find_sequences(data), DEFAULT_LIMIT if limit is None else limit, seed)
-    _require_views([sequence for pair in pairs for sequence in pair], [setting.views for setting in settings])
+    require_views([sequence for pair in pairs for sequence in pair], [setting.views for setting in settings])
     files = encode_pairs(pairs, Encoder(network))
     by_setting = [_jobs(setting, pairs, files, seed) for setting in settings]
     jobs = [job for jobs_of_reference in zip(*by_setting) for job in jobs_of_reference]  # what one has read serves the next
@@ -225,13 +225,6 @@ def _translation_figures(results: Sequence[JobResult]) -> dict[str, float | None
     distances = 2 * np.pi * np.array([error.translation for _, error in targets]) * ratios
     within = [100 * float((distances <= limit).mean()) for limit in (1.0, 0.5, 0.2)]
     return dict(zip(TRANSLATION, [float(np.median(distances)), *within], strict=True))
-
-
-def _require_views(sequences: Sequence[folders.Sequence], counts: Sequence[ViewCounts]) -> None:
-    most = max(max(count.reference or 0, count.target or 0) for count in counts)
-    for sequence in sequences:
-        if len(sequence.images) < most:
-            raise InvalidInput("views", f"{most} were asked for, but {sequence.name} has {len(sequence.images)}; ask for fewer")
 
 
 def _jobs(setting: Setting, pairs: Sequence[Pair], files: dict[str, Path], seed: int) -> list[Job]:

@@ -39,7 +39,7 @@ class RenderingRow:
 COLUMNS = tuple(field.name for field in fields(RenderingRow))
 
 
-def run(json: Path | None, categories: Sequence[str], frames: int = 12, seed: int = 0) -> list[RenderingRow]:
+def run(json: Path | None, categories: Sequence[str], frames: int, seed: int) -> list[RenderingRow]:
     """A row for one object of each category, all of them where none is named; prints a table. Raises InvalidInput for an unknown one."""
     models = draw_models(categories, 1, seed)
     with bar() as progress:

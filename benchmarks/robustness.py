@@ -15,20 +15,21 @@ from zlib import crc32
 
 import numpy as np
 
-from benchmarks.clean_memory import UNSEEN, Decisions, Known, decide_by, lay
+from benchmarks.clean_memory import UNSEEN, CleanMemory, Decisions, Known
 from benchmarks.degradations.catalogue import CLUTTER, Degradation, catalogue
 from benchmarks.degraded import Remembering, encode_degraded, masked_views
 from benchmarks.encoded import encode_all
 from benchmarks.pair_scores import auroc
-from benchmarks.pairs import ViewCounts, choose_views
+from benchmarks.pairs import ViewCounts, choose_views, require_true_poses, require_views
 from benchmarks.parallel import map_jobs
 from benchmarks.robustness_plot import plot
 from benchmarks.tables import Row, print_table, write_json
 from clients.datasets import folders
 from clients.datasets.sources import find_sequences
 from clients.pose_error import NO_POSE, PoseError, accuracy, median, pose_error
-from core.backbones import EMBEDDED, load_backbone
+from core.backbones import load_backbone
 from core.backbones.base import Backbone
+from core.backbones.whitening import Whitening
 from core.encode import Encoder
 from core.errors import InvalidInput, NoObject
 from core.sim3 import Sim3
@@ -68,6 +69,11 @@ class Recordings:
         """A sequence as the memory holds it."""
         return Known(self.sequences[index].category, self.files[index], self.chosen(index, "reference"))
 
+    def memory_without(self, index: int, whitening: Whitening | None) -> CleanMemory:
+        """All sequences but one."""
+        others = tuple(self.known(other) for other in range(len(self.sequences)) if other != index)
+        return CleanMemory(others, whitening, self.seed, self.poses)
+
     def things(self, index: int) -> list[int]:
         """Sequences of other categories than that of a sequence."""
         return [other for other, each in enumerate(self.sequences) if each.category != self.sequences[index].category]
@@ -99,14 +105,15 @@ def run(
     data: Path,
     json: Path | None,
     picture: Path | None,
-    views: str = "8",
-    limit: int | None = None,
-    degradations: Sequence[str] = (),
-    categories: Sequence[str] = (),
-    strongest: int | None = None,
-    seed: int = 0,
-    backbone: str = EMBEDDED,
-    poses: bool = True,
+    *,
+    views: str,
+    limit: int | None,
+    degradations: Sequence[str],
+    categories: Sequence[str],
+    strongest: int | None,
+    seed: int,
+    backbone: str,
+    poses: bool,
 ) -> list[Row]:
     """Degrades up to `limit` objects a category of `data`; prints and returns a row for each strength, and one for each degradation.
 
@@ -174,9 +181,9 @@ def plan(recordings: Recordings, limit: int | None, degradations: Sequence[Degra
         for rank, target in enumerate(order[:limit] if len(order) > 1 else []):
             others = (order[rank + 1 :] + order[:rank])[:REFERENCES]
             ranked.append((rank, target, tuple(others)))
-    if not ranked:
-        raise InvalidInput("data", "no category has two instances, so there is no pair to estimate")
-    _require(recordings, [index for _, target, others in ranked for index in (target, *others)])
+    tried = [recordings.sequences[index] for _, target, others in ranked for index in (target, *others)]
+    require_true_poses(tried)
+    require_views(tried, [recordings.views])
     jobs = [(rank, Job(recordings, target, others, group)) for group in groups for rank, target, others in ranked]
     return [job for _, job in sorted(jobs, key=lambda entry: entry[0])]
 
@@ -197,19 +204,18 @@ def work(job: Job) -> list[Outcome]:
 
 def judge(job: Job, views: Sequence[View], encoder: Encoder) -> tuple[tuple[PoseError, ...], Decisions]:
     """Errors of the pose against each of the job's references, and the decision; where no object is found there is neither."""
-    recordings, whitening = job.recordings, encoder.backbone.whitening
+    recordings = job.recordings
     try:
         file = encode_degraded(views, encoder)
     except NoObject:
         return (NO_POSE,) * len(job.references), UNSEEN
     sequence = recordings.sequences[job.target]
+    memory = recordings.memory_without(job.target, encoder.backbone.whitening)
     errors = []
     for other in job.references:
-        found = lay(recordings.known(other), file, whitening, recordings.seed).target_from_reference
+        found = memory.lay(recordings.known(other), file).target_from_reference
         errors.append(NO_POSE if found is None else _error(found, recordings.sequences[other], sequence))
-    memory = [recordings.known(other) for other in range(len(recordings.sequences)) if other != job.target]
-    decisions = decide_by(memory, sequence.category, file, whitening, recordings.seed, poses=recordings.poses)
-    return tuple(errors), decisions
+    return tuple(errors), memory.decide(file, sequence.category)
 
 
 def table_rows(degradations: Sequence[Degradation], outcomes: Sequence[Outcome]) -> list[Row]:
@@ -272,12 +278,3 @@ def _error(estimate: Sim3, reference: folders.Sequence, target: folders.Sequence
 
 def _masked(recordings: Recordings, index: int, indices: Sequence[int]) -> list[View]:
     return masked_views(recordings.sequences[index], recordings.files[index], indices)
-
-
-def _require(recordings: Recordings, indices: Sequence[int]) -> None:
-    most = max(recordings.views.reference or 0, recordings.views.target or 0)
-    for sequence in (recordings.sequences[index] for index in indices):
-        if sequence.world_from_model is None:
-            raise InvalidInput(str(sequence.path), "has no true pose (scene_gt.json), which poses are scored against")
-        if len(sequence.images) < most:
-            raise InvalidInput("views", f"{most} were asked for, but {sequence.name} has {len(sequence.images)}; ask for fewer")

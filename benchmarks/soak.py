@@ -53,15 +53,16 @@ class SoakResult:
 
 
 def run(
+    json: Path | None,
+    plot: Path | None,
+    *,
     minutes: float,
     most_growth: float,
-    json: Path | None = None,
-    plot: Path | None = None,
-    robots: int = 2,
-    views: int = 4,
-    data: Path | None = None,
-    url: str | None = None,
-    seed: int = 0,
+    robots: int,
+    views: int,
+    data: Path | None,
+    url: str | None,
+    seed: int,
 ) -> SoakResult:
     """Prints one line; raises InvalidInput where anything failed or the process grew by more than the share `most_growth`.
 

@@ -22,7 +22,7 @@ from benchmarks.tables import print_table, report
 from clients.datasets import folders
 from clients.datasets.samples import data_or_samples
 from clients.datasets.sources import find_sequences
-from core.backbones import EMBEDDED, load_backbone
+from core.backbones import load_backbone
 from core.backbones.base import Backbone
 from core.backbones.dino import fast_dtype
 from core.backbones.whitening import Whitening
@@ -79,12 +79,13 @@ MORE = 3
 
 def run(
     json: Path | None,
-    data: Path | None = None,
-    views: int = 10,
-    rounds: int = 5,
-    backbone: str = EMBEDDED,
-    device: str = "cpu",
-    plot: Path | None = None,
+    data: Path | None,
+    *,
+    views: int,
+    rounds: int,
+    backbone: str,
+    device: str,
+    plot: Path | None,
 ) -> list[SpeedRow]:
     """Times one observation of `views` views of an object of `data` (the samples where None) against a reference of as many.
 

@@ -17,7 +17,7 @@ from benchmarks.parallel import bar
 from benchmarks.tables import report
 from clients.datasets import folders
 from clients.datasets.sources import find_sequences
-from core.backbones import EMBEDDED, load_backbone
+from core.backbones import load_backbone
 from core.encode import Encoder
 from core.errors import InvalidInput
 from core.reference import build_reference
@@ -47,7 +47,7 @@ class SymmetryRow:
 COLUMNS = tuple(field.name for field in fields(SymmetryRow))
 
 
-def run(data: Path, json: Path | None, views: int = 10, limit: int | None = None, backbone: str = EMBEDDED) -> list[SymmetryRow]:
+def run(data: Path, json: Path | None, views: int, limit: int | None, backbone: str) -> list[SymmetryRow]:
     """Builds a reference of up to `limit` objects a category, from `views` of each; prints and returns the table.
 
     Raises InvalidInput where no sequence has a ground truth.

@@ -89,14 +89,7 @@ class Stream:
         return TrackRow(side_px, warm, len(self.sent_s), len(late_ms) / took_s, p50, p95, p99, self.dropped, float(np.mean(self.measured)))
 
 
-def run(
-    serve: Serve,
-    json: Path | None,
-    grids: Sequence[int] = (16, 28),
-    rate_hz: float = 15.0,
-    seconds: float = 20.0,
-    data: Path | None = None,
-) -> list[TrackRow]:
+def run(serve: Serve, json: Path | None, *, grids: Sequence[int], rate_hz: float, seconds: float, data: Path | None) -> list[TrackRow]:
     """A row for each side of the close crop, with and without the last pose; prints a table.
 
     `serve` starts a service of the benchmark's own: this package knows none. Raises InvalidInput where no category has two objects.

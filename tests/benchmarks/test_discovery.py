@@ -16,7 +16,17 @@ from core.scores.base import Score
 
 def test_a_score_that_does_not_exist_is_refused_before_any_data_are_read(tmp_path: Path) -> None:
     with pytest.raises(InvalidInput, match="'nonsense' is none of"):
-        run(tmp_path / "missing", ["paper_sum", "nonsense"], None)
+        run(
+            tmp_path / "missing",
+            ["paper_sum", "nonsense"],
+            None,
+            episodes=1,
+            length=1,
+            seed=0,
+            backbone="colour",
+            picture=None,
+            poses=True,
+        )
 
 
 @pytest.mark.parametrize("asked", [[], ["added"], [BEST, "added"]])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import fields
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -63,11 +64,12 @@ def test_each_size_is_asked_after_it_was_filled(monkeypatch: pytest.MonkeyPatch,
         figures = dict.fromkeys((field.name for field in fields(growth.GrowthRow)), 1.0) | {"categories": sum(filled), "exact": True}
         return GrowthRow(**figures)
 
-    rows = growth.run(fill, measure, tmp_path / "growth.json", tmp_path / "growth.png", (2, 5), views=2, rounds=3, exact_up_to=2)
+    run = partial(growth.run, fill, measure, views=2, rounds=3, exact_up_to=2, data=None, backbone="colour", seed=0)
+    rows = run(tmp_path / "growth.json", tmp_path / "growth.png", categories=(2, 5))
     assert filled == [2, 3]
     assert [row.categories for row in rows] == [2, 5]
     assert [probe.exact for probe in probes] == [True, False]
     assert all(len(probe.known) == 3 and max(probe.right) < count for probe, count in zip(probes, (2, 5)))
     assert {file.name for file in tmp_path.iterdir()} == {"growth.json", "growth.png"}
     with pytest.raises(InvalidInput, match="growing"):
-        growth.run(fill, measure, None, categories=(5, 2))
+        run(None, None, categories=(5, 2))

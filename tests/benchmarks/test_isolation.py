@@ -43,7 +43,7 @@ def test_rows_are_means_over_views_then_categories() -> None:
 
 def test_an_object_on_black_is_found(recorded: Path, small_world: Any) -> None:
     small_world(isolation)
-    *_, everything = isolation.run(recorded, None, ["saliency"])
+    *_, everything = isolation.run(recorded, None, ["saliency"], limit=None, backbone="colour")
     assert everything.iou > 85
     assert everything.views == 8
 
@@ -52,4 +52,4 @@ def test_silhouettes_are_needed(tmp_path: Path, recorded: Path) -> None:
     for mask in recorded.rglob("mask_visib/*.png"):
         mask.unlink()
     with pytest.raises(InvalidInput, match="silhouettes"):
-        isolation.run(recorded, None)
+        isolation.run(recorded, None, isolation.SOURCES, limit=None, backbone="colour")

@@ -6,6 +6,7 @@ import asyncio
 import json
 import time
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -39,7 +40,7 @@ def url(tmp_path: Path, backbone: Any, serving: Any, monkeypatch: pytest.MonkeyP
 
 
 def test_more_robots_than_places_are_refused_and_nobody_fails(url: str, recorded: Path, tmp_path: Path) -> None:
-    rows = load.run(tmp_path / "load.json", tmp_path / "load.png", [1, 6], seconds=2.5, views=3, data=recorded, url=url)
+    rows = load.run(tmp_path / "load.json", tmp_path / "load.png", robots=[1, 6], seconds=2.5, views=3, data=recorded, url=url, seed=0)
     alone, crowded = rows
     assert (alone.robots, alone.refused, alone.failed) == (1, 0, 0)
     assert alone.answered > 0
@@ -55,7 +56,7 @@ def test_more_robots_than_places_are_refused_and_nobody_fails(url: str, recorded
 
 def test_load_is_put_on_this_machine_only(recorded: Path) -> None:
     with pytest.raises(InvalidInput, match="of this machine"):
-        load.run(None, robots=[1], data=recorded, url="http://robot.example:8000")
+        load.run(None, None, robots=[1], seconds=1, views=3, data=recorded, url="http://robot.example:8000", seed=0)
 
 
 def test_fates_are_told_apart_and_refused_robots_wait(url: str) -> None:
@@ -89,11 +90,12 @@ def test_growth_is_of_the_settled_process() -> None:
 
 
 def test_a_process_that_grows_or_fails_is_told(url: str, recorded: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    half_an_hour = partial(soak.run, None, None, minutes=30, most_growth=0.05, robots=2, views=4, seed=0)
     monkeypatch.setattr(soak, "_soak", lambda *_: grown(5))
     with pytest.raises(InvalidInput, match=r"growth: the process grew by 7\.\d %"):
-        soak.run(30, 0.05, data=recorded, url=url)
+        half_an_hour(data=recorded, url=url)
     failed = grown(0)
     failed.attempts.append(Attempt(61.0, 1.0, "failed", "500 unexpected"))
     monkeypatch.setattr(soak, "_soak", lambda *_: failed)
     with pytest.raises(InvalidInput, match="1 errands failed, the first with: 500 unexpected"):
-        soak.run(30, 0.05, data=recorded, url=url)
+        half_an_hour(data=recorded, url=url)

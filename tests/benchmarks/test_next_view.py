@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import json
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from benchmarks import next_view
-from benchmarks.next_view import Case, run, summary, verdict
+from benchmarks.next_view import Case, summary, verdict
 from clients.simulator.raycast.world import RaycastWorld
 from core.errors import InvalidInput
 from core.novelty import Decision
+
+run = partial(next_view.run, instances=1, looks=1, rate=0.04, seed=0, backbone="colour")
 
 
 def decision(outcome: str) -> Decision:
@@ -50,7 +53,7 @@ def test_every_object_is_met_by_either_half(tmp_path: Path, monkeypatch: pytest.
     monkeypatch.setattr(RaycastWorld, "capture", RaycastWorld.capture_with_mask)  # this backbone finds no object by itself
     monkeypatch.setattr(next_view, "SCANNED", 3)
     monkeypatch.setattr(next_view, "map_jobs", lambda function, jobs, weight, description: [function(job) for job in jobs])
-    run(tmp_path / "found.json", ["mug", "bear"], instances=1, looks=1, rate=0.04)
+    run(tmp_path / "found.json", ["mug", "bear"])
     rows = json.loads((tmp_path / "found.json").read_text())["rows"]
     assert [row["next_view"] for row in rows[:3]] == ["none", "offered", "random"]
     assert sorted((row["category"], row["held"]) for row in rows[3:]) == [("bear", False), ("bear", True), ("mug", False), ("mug", True)]

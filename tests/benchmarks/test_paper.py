@@ -32,7 +32,7 @@ def test_both_tables_from_one_run(recorded: Path, tmp_path: Path, monkeypatch: p
     sweeps = [Sweep(["ucd"], ["4"], dims=[32, 24])]
     monkeypatch.setattr(paper, "SWEEPS", sweeps)
     monkeypatch.setattr(paper, "PUBLISHED", (paper.Published(1, "Ours-UCD", 10, 32, 26.2, 64.5, 49.4, 29.2, ("ucd", "4", 32)),))
-    first, second = paper.run(recorded, 1, tmp_path / "paper.json")
+    first, second = paper.run(recorded, 1, tmp_path / "paper.json", seed=0, backbone="colour")
     assert (first.method, first.paper_acc30, first.variant, first.dims, first.acc30) == ("Ours-UCD", 64.5, "ucd", 32, 100)
     assert (second.method, second.paper_acc30, second.dims, second.acc30) == ("not published", None, 24, 100)
     written = json.loads((tmp_path / "paper.json").read_text())
@@ -42,4 +42,4 @@ def test_both_tables_from_one_run(recorded: Path, tmp_path: Path, monkeypatch: p
 def test_ten_views_are_needed(recorded: Path, small_world: Any) -> None:
     small_world(pose)
     with pytest.raises(InvalidInput, match="10 were asked for"):
-        paper.run(recorded, 1, None)
+        paper.run(recorded, 1, None, seed=0, backbone="colour")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import pickle
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +28,7 @@ COLUMNS = {
     *("median_t_2pi", "acc_t1_0", "acc_t0_5", "acc_t0_2"),
     *("method", "consensus_deg", "inlier_ratio", "estimator", "dof"),
 }
+run = partial(pose.run, seed=0, backbone="colour")
 
 
 @pytest.fixture(autouse=True)
@@ -36,7 +38,7 @@ def small(small_world) -> None:
 
 def test_a_known_similarity_is_recovered(recorded: Path, tmp_path: Path) -> None:
     file = tmp_path / "out" / "pose.json"
-    pose.run(recorded, Sweep(["ucd"], ["4"]), 1, file)
+    run(recorded, Sweep(["ucd"], ["4"]), 1, file)
     written = json.loads(file.read_text())
     category, everything = written["rows"]
     assert set(category) == COLUMNS
@@ -49,7 +51,7 @@ def test_a_known_similarity_is_recovered(recorded: Path, tmp_path: Path) -> None
 
 
 def test_the_same_seed_gives_the_same_figures(recorded: Path) -> None:
-    first, again = (pose.run(recorded, Sweep(["ucd"], ["3+2"]), 1, None, seed=5)[0] for _ in range(2))
+    first, again = (run(recorded, Sweep(["ucd"], ["3+2"]), 1, None, seed=5)[0] for _ in range(2))
     assert replace(first, solve_ms=0) == replace(again, solve_ms=0)
 
 
@@ -57,21 +59,21 @@ def test_a_job_and_its_result_can_travel_between_processes(recorded: Path, monke
     def travelled(function, jobs, *_: object) -> list[object]:
         return [pickle.loads(pickle.dumps(function(pickle.loads(pickle.dumps(job))))) for job in jobs]
 
-    here = pose.run(recorded, Sweep(["ucd"], ["4"]), 1, None)
+    here = run(recorded, Sweep(["ucd"], ["4"]), 1, None)
     monkeypatch.setattr(pose, "map_jobs", travelled)
-    there = pose.run(recorded, Sweep(["ucd"], ["4"]), 1, None)
+    there = run(recorded, Sweep(["ucd"], ["4"]), 1, None)
     assert [replace(row, solve_ms=0) for row in there] == [replace(row, solve_ms=0) for row in here]
 
 
 def test_descriptor_sizes(recorded: Path) -> None:
-    rows = pose.run(recorded, Sweep(["ucd"], ["4"], dims=[6, 64]), 1, None)
+    rows = run(recorded, Sweep(["ucd"], ["4"], dims=[6, 64]), 1, None)
     assert [row.dims for row in rows] == [6, 6, 64, 64]
 
 
 def test_nine_degrees_fit_a_box_that_seven_do_not(tmp_path: Path, ellipsoid) -> None:
     for name, half_axes in (("long", [0.36, 0.3, 0.3]), ("short", [0.3, 0.3, 0.3])):
         record(tmp_path / "data" / "egg" / name, ellipsoid(np.array(half_axes)), Sim3(0.4, np.eye(3), np.zeros(3)), views=8)
-    rows = pose.run(tmp_path / "data", Sweep(["ucd"], ["8"], dof=[7, 9]), 2, None)
+    rows = run(tmp_path / "data", Sweep(["ucd"], ["8"], dof=[7, 9]), 2, None)
     seven, nine = (row for row in rows if row.category == "all")
     assert (seven.dof, nine.dof, nine.answered) == (7, 9, 100)
     assert seven.median_iou < nine.median_iou
@@ -79,7 +81,7 @@ def test_nine_degrees_fit_a_box_that_seven_do_not(tmp_path: Path, ellipsoid) -> 
 
 def test_options_multiply_and_are_in_every_row(recorded: Path, tmp_path: Path) -> None:
     sweep = Sweep(["ucd"], ["4"], methods=["mutual", "cyclical"], consensus_deg=[15.0], inlier_ratios=[0.05], estimators=["ransac"])
-    pose.run(recorded, sweep, 1, tmp_path / "pose.json")
+    run(recorded, sweep, 1, tmp_path / "pose.json")
     rows = json.loads((tmp_path / "pose.json").read_text())["rows"]
     assert [row["method"] for row in rows] == ["mutual", "mutual", "cyclical", "cyclical"]
     assert {(row["consensus_deg"], row["inlier_ratio"], row["estimator"]) for row in rows} == {(15.0, 0.05, "ransac")}
@@ -94,7 +96,7 @@ def test_plus_takes_all_views_of_both_whatever_is_asked_of_the_others(recorded: 
         return estimate(self, reference, target, seed=seed)
 
     monkeypatch.setattr(PoseEstimator, "estimate", watched)
-    rows = pose.run(recorded, Sweep(["ucd", "ucd+"], ["3", "3+2"]), 1, None)
+    rows = run(recorded, Sweep(["ucd", "ucd+"], ["3", "3+2"]), 1, None)
     assert seen == [("ucd", 3, 3), ("ucd", 3, 2), ("ucd+", 4, 4)]
     assert [row.views for row in rows if row.category == "all"] == ["3", "3+2", "all"]
 
@@ -115,7 +117,7 @@ def test_plus_takes_all_views_of_both_whatever_is_asked_of_the_others(recorded: 
 def test_what_cannot_be_run_is_said_with_its_field(recorded: Path, change: dict[str, object], field: str) -> None:
     given = {"variants": ["ucd"], "views": ["4"]} | change
     with pytest.raises(InvalidInput) as caught:
-        pose.run(recorded, Sweep(**given), limit=1, json=None)
+        run(recorded, Sweep(**given), limit=1, json=None)
     assert caught.value.field == field
 
 
@@ -124,7 +126,7 @@ def test_a_refused_pose_counts_as_180(recorded: Path, tmp_path: Path, monkeypatc
         raise NoPose("nothing fits")
 
     monkeypatch.setattr(PoseEstimator, "estimate", refuse)
-    (row, _) = pose.run(recorded, Sweep(["ucd"], ["4"]), 1, tmp_path / "pose.json")
+    (row, _) = run(recorded, Sweep(["ucd"], ["4"]), 1, tmp_path / "pose.json")
     assert (row.acc30, row.median_deg) == (0, 180)
     assert json.loads((tmp_path / "pose.json").read_text())["rows"][0]["median_t"] is None
 

@@ -12,7 +12,7 @@ from core.errors import InvalidInput
 
 
 def test_a_row_an_object_and_their_mean(tmp_path: Path) -> None:
-    run(tmp_path / "rendering.json", ["mug"], frames=1)
+    run(tmp_path / "rendering.json", ["mug"], frames=1, seed=0)
     written = json.loads((tmp_path / "rendering.json").read_text())
     assert written["meta"]["size"] == [480, 640]
     assert [row["category"] for row in written["rows"]] == ["mug", "all"]
@@ -22,4 +22,4 @@ def test_a_row_an_object_and_their_mean(tmp_path: Path) -> None:
 
 def test_an_unknown_category_is_named() -> None:
     with pytest.raises(InvalidInput, match="unicorn"):
-        run(None, ["unicorn"])
+        run(None, ["unicorn"], frames=1, seed=0)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import pickle
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ import pytest
 from benchmarks import clean_memory, robustness
 from benchmarks.clean_memory import Decisions
 from benchmarks.degradations.catalogue import catalogue
-from benchmarks.robustness import CLEAN, Outcome, breaks_at, figures, run, table_rows
+from benchmarks.robustness import CLEAN, Outcome, breaks_at, figures, table_rows
 from clients.pose_error import NO_POSE, PoseError
 from core.errors import InvalidInput, NoObject
 from core.sim3 import Sim3
@@ -23,6 +24,7 @@ from .conftest import record
 
 KNOWN = Decisions(own=2.0, rival=1.0, right=True, nearest=True, uncertain=False, novel=False, false_known=False)
 MISSED = Decisions(own=0.0, rival=1.0, right=False, nearest=False, uncertain=False, novel=True, false_known=True)
+run = partial(robustness.run, views="3", limit=None, degradations=[], categories=[], strongest=None, seed=0, backbone="colour", poses=True)
 
 
 @pytest.fixture(autouse=True)
@@ -51,7 +53,7 @@ def only(monkeypatch: pytest.MonkeyPatch, **strengths: tuple[float, ...]) -> lis
 def test_a_mild_degradation_does_no_harm_and_a_hopeless_one_does(two_kinds: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     names = only(monkeypatch, depth_noise=(5,), camera_turn=(90,))
     file = tmp_path / "robustness.json"
-    rows = run(two_kinds, file, tmp_path / "plot", views="3", limit=1, degradations=names)
+    rows = run(two_kinds, file, tmp_path / "plot", limit=1, degradations=names)
     clean, noisy, turned, *breaks = rows
     assert (clean["degradation"], clean["acc30"]) == (CLEAN, 100)
     assert noisy["acc30"] == 100
@@ -64,10 +66,10 @@ def test_a_mild_degradation_does_no_harm_and_a_hopeless_one_does(two_kinds: Path
 
 def test_what_is_done_is_not_done_again(two_kinds: Path, backbone, monkeypatch: pytest.MonkeyPatch) -> None:
     names = only(monkeypatch, motion_blur=(2,))
-    first = run(two_kinds, None, None, views="3", limit=1, degradations=names)
+    first = run(two_kinds, None, None, limit=1, degradations=names)
     calls = backbone.calls
     monkeypatch.delattr(clean_memory, "_lay")
-    assert run(two_kinds, None, None, views="3", limit=1, degradations=names) == first
+    assert run(two_kinds, None, None, limit=1, degradations=names) == first
     assert backbone.calls == calls
 
 
@@ -76,9 +78,9 @@ def test_a_job_and_its_outcomes_can_travel_between_processes(two_kinds: Path, mo
         return [pickle.loads(pickle.dumps(function(pickle.loads(pickle.dumps(job))))) for job in jobs]
 
     names = only(monkeypatch, jpeg=(50,))
-    here = run(two_kinds, None, None, views="3", limit=1, degradations=names, poses=False)
+    here = run(two_kinds, None, None, limit=1, degradations=names, poses=False)
     monkeypatch.setattr(robustness, "map_jobs", travelled)
-    assert run(two_kinds, None, None, views="3", limit=1, degradations=names, poses=False) == here
+    assert run(two_kinds, None, None, limit=1, degradations=names, poses=False) == here
 
 
 def test_where_no_object_is_found_there_is_no_pose_and_no_answer(two_kinds: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -87,7 +89,7 @@ def test_where_no_object_is_found_there_is_no_pose_and_no_answer(two_kinds: Path
 
     names = only(monkeypatch, jpeg=(50,))
     monkeypatch.setattr(robustness, "encode_degraded", nothing)
-    clean, *_ = run(two_kinds, None, None, views="3", limit=1, degradations=names)
+    clean, *_ = run(two_kinds, None, None, limit=1, degradations=names)
     shares = ("acc30", "right", "uncertain", "novel", "nearest", "false_known")
     assert [clean[name] for name in shares] == [0] * len(shares)
     assert clean["median_deg"] == 180
@@ -101,7 +103,7 @@ def test_a_smaller_limit_takes_a_prefix(two_kinds: Path) -> None:
             robustness, "work", lambda job: seen.append(job.recordings.sequences[job.target].name) or [Outcome(CLEAN, 0, (NO_POSE,), KNOWN)]
         )
         mock.setattr(robustness, "table_rows", lambda *_: [])
-        run(two_kinds, None, None, views="3", limit=limit, degradations=["depth noise"])
+        run(two_kinds, None, None, limit=limit, degradations=["depth noise"])
         mock.undo()
         return seen
 
@@ -111,7 +113,7 @@ def test_a_smaller_limit_takes_a_prefix(two_kinds: Path) -> None:
 
 def test_targets_may_be_of_some_categories_and_strengths_the_last_ones(two_kinds: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     names = only(monkeypatch, jpeg=(50, 5))
-    rows = run(two_kinds, None, None, views="3", degradations=names, categories=["plate"], strongest=1, poses=False)
+    rows = run(two_kinds, None, None, degradations=names, categories=["plate"], strongest=1, poses=False)
     assert {(row["bursts"], row["pairs"]) for row in rows[:-1]} == {(2, 2)}
     assert [row["strength"] for row in rows[:-1]] == [0, 5]
 
@@ -146,6 +148,6 @@ def test_what_does_not_exist_is_refused(recorded: Path) -> None:
     with pytest.raises(InvalidInput, match="fog"):
         run(recorded, None, None, degradations=["fog"])
     with pytest.raises(InvalidInput, match="cat"):
-        run(recorded, None, None, views="3", degradations=["jpeg"], categories=["cat"])
+        run(recorded, None, None, degradations=["jpeg"], categories=["cat"])
     with pytest.raises(InvalidInput, match="views"):
         run(recorded, None, None, views="9", degradations=["jpeg"])

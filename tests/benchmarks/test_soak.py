@@ -35,6 +35,16 @@ def process(tmp_path: Path) -> Iterator[str]:
 
 
 def test_hundreds_of_errands_leave_the_process_as_it_was(process: str, recorded: Path, tmp_path: Path) -> None:
-    result = soak.run(MINUTES, MOST_GROWTH, plot=tmp_path / "soak.png", robots=2, views=3, data=recorded, url=process)
+    result = soak.run(
+        None,
+        tmp_path / "soak.png",
+        minutes=MINUTES,
+        most_growth=MOST_GROWTH,
+        robots=2,
+        views=3,
+        data=recorded,
+        url=process,
+        seed=0,
+    )
     assert result.answered > 110
     assert result.refused == 0  # two robots for a worker and four places

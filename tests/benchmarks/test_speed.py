@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -9,6 +10,8 @@ import pytest
 from benchmarks import speed
 from core.errors import InvalidInput
 from core.pose import VARIANTS
+
+run = partial(speed.run, rounds=1, backbone="colour", device="cpu")
 
 
 def test_medians_and_ratios() -> None:
@@ -20,7 +23,7 @@ def test_medians_and_ratios() -> None:
 def test_every_stage_is_timed_and_drawn(recorded: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, backbone) -> None:
     monkeypatch.setattr(speed, "load_backbone", lambda name, device, dtype=None: backbone)
     monkeypatch.setattr(speed, "WARM_UP", 0)
-    rows = speed.run(None, data=recorded, views=2, rounds=1, plot=tmp_path / "speed.png")
+    rows = run(None, recorded, views=2, plot=tmp_path / "speed.png")
     totals = {row.operation for row in rows if row.stage == "total"}
     assert {"encode", "learn", "decide best, 3 poses", *(f"solve {variant}" for variant in VARIANTS)} <= totals
     assert sum(row.ratio for row in rows if row.stage == "total" and row.operation in speed.OBSERVATION) == pytest.approx(1)
@@ -29,7 +32,7 @@ def test_every_stage_is_timed_and_drawn(recorded: Path, tmp_path: Path, monkeypa
 
 def test_two_objects_with_enough_views_are_needed(recorded: Path) -> None:
     with pytest.raises(InvalidInput, match="5 views"):
-        speed.run(None, data=recorded, views=5)
+        run(None, recorded, views=5, plot=None)
 
 
 def test_bounds_are_compared_with_ratios_of_the_same_run() -> None:

@@ -52,7 +52,7 @@ def test_rows_are_sums() -> None:
 
 def test_an_object_painted_by_place_has_none(recorded: Path, tmp_path: Path, small_world: Any) -> None:
     small_world(symmetries)
-    *_, everything = symmetries.run(recorded, tmp_path / "rows.json")
+    *_, everything = symmetries.run(recorded, tmp_path / "rows.json", views=10, limit=None, backbone="colour")
     assert (everything.objects > 0, everything.symmetric, everything.false) == (True, 0, 0)
     assert (tmp_path / "rows.json").exists()
 
@@ -61,4 +61,4 @@ def test_a_ground_truth_is_needed(tmp_path: Path, recorded: Path) -> None:
     for file in recorded.rglob("scene_gt.json"):
         file.unlink()
     with pytest.raises(InvalidInput, match="scene_gt"):
-        symmetries.run(recorded, None)
+        symmetries.run(recorded, None, views=10, limit=None, backbone="colour")

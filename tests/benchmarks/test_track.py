@@ -32,4 +32,4 @@ def test_rate_latency_and_what_was_dropped() -> None:
 
 def test_a_kind_of_one_object_has_nothing_to_follow(tmp_path: Path) -> None:
     with pytest.raises(InvalidInput):
-        track.run(lambda memory, grid, warm: pytest.fail("nothing is to be served"), None, data=tmp_path)
+        track.run(lambda memory, grid, warm: pytest.fail("nothing is to be served"), None, grids=[16], rate_hz=15, seconds=1, data=tmp_path)

@@ -15,8 +15,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-import matplotlib
 import numpy as np
+from matplotlib.figure import Figure
 
 from benchmarks import load
 from core.sim3 import Sim3
@@ -46,7 +46,8 @@ def measured(kind: str, cluster: bool) -> list[dict[str, Any]]:
         folder, port = Path(scratch), free_port()
         data = eggs(folder / "data") if kind == "sleeping" else None
         with started(command(kind, cluster, folder / "memory", port), port, folder / "log") as service:
-            load.run(folder / "rows.json", None, ROBOTS, SECONDS[kind], VIEWS, data, url=str(service.http.base_url).rstrip("/"))
+            url = str(service.http.base_url).rstrip("/")
+            load.run(folder / "rows.json", None, robots=ROBOTS, seconds=SECONDS[kind], views=VIEWS, data=data, url=url, seed=0)
         rows: list[dict[str, Any]] = json.loads((folder / "rows.json").read_text())["rows"]
     return rows
 
@@ -60,10 +61,8 @@ def eggs(folder: Path) -> Path:
 
 def draw(picture: Path, found: dict[str, dict[str, list[dict[str, Any]]]]) -> None:
     """Answers a second against robots, a panel for each kind."""
-    matplotlib.use("agg")
-    from matplotlib import pyplot
-
-    figure, panels = pyplot.subplots(1, len(found), figsize=(4.5 * len(found), 3.6), layout="constrained", squeeze=False)
+    figure = Figure((4.5 * len(found), 3.6), layout="constrained")
+    panels = figure.subplots(1, len(found), squeeze=False)
     for panel, (kind, both) in zip(panels[0], found.items()):
         for label, rows in both.items():
             panel.plot([row["robots"] for row in rows], [row["per_s"] for row in rows], "o-", label=label)
