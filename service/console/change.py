@@ -10,9 +10,9 @@ from fastapi.responses import HTMLResponse, RedirectResponse
 
 from core.errors import NotFound
 from service.agent import Agent
-from service.console.pages import Page, query, render
+from service.console.pages import ConsoleActorDep, Page, query, render
 from service.console.words import change_words
-from service.deps import ActorDep, AgentDep, WorkDep
+from service.deps import AgentDep, WorkDep
 from service.schemas.fields import LONGEST_NAME
 from store.records import AuditEntry
 
@@ -46,7 +46,7 @@ def _after(agent: Agent, category_id: str, address: str | None = None) -> Redire
 
 
 @router.post("/categories/{category_id}/rename")
-def rename(category_id: str, agent: AgentDep, actor: ActorDep, name: Name = "") -> RedirectResponse:
+def rename(category_id: str, agent: AgentDep, actor: ConsoleActorDep, name: Name = "") -> RedirectResponse:
     """An empty name takes it away."""
     agent.curation.rename(category_id, name.strip() or None, actor=actor)
     return _after(agent, category_id)
@@ -62,7 +62,7 @@ def plan_merge(request: Request, category_id: str, agent: AgentDep, into: Annota
 
 
 @router.post("/categories/{category_id}/merge")
-def merge(category_id: str, agent: AgentDep, actor: ActorDep, into: Annotated[str, Form()]) -> RedirectResponse:
+def merge(category_id: str, agent: AgentDep, actor: ConsoleActorDep, into: Annotated[str, Form()]) -> RedirectResponse:
     """Its bursts join the other one."""
     agent.curation.merge(category_id, into, actor=actor)
     return _after(agent, into)
@@ -70,7 +70,7 @@ def merge(category_id: str, agent: AgentDep, actor: ActorDep, into: Annotated[st
 
 @router.post("/categories/{category_id}/split")
 async def split(
-    category_id: str, agent: AgentDep, work: WorkDep, actor: ActorDep, instance: Annotated[list[str], Form()], name: Name = ""
+    category_id: str, agent: AgentDep, work: WorkDep, actor: ConsoleActorDep, instance: Annotated[list[str], Form()], name: Name = ""
 ) -> RedirectResponse:
     """Bursts leave for a category of their own."""
     made = await work.run(lambda: agent.curation.split(category_id, instance, name.strip() or None, actor=actor))
@@ -78,7 +78,7 @@ async def split(
 
 
 @router.post("/categories/{category_id}/forget")
-def forget(category_id: str, agent: AgentDep, actor: ActorDep, instance: Annotated[str, Form()]) -> RedirectResponse:
+def forget(category_id: str, agent: AgentDep, actor: ConsoleActorDep, instance: Annotated[str, Form()]) -> RedirectResponse:
     """Takes a burst out of it."""
     agent.curation.forget_instance(category_id, instance, actor=actor)
     return _after(agent, category_id)
@@ -92,14 +92,14 @@ def plan_deletion(request: Request, category_id: str, agent: AgentDep) -> HTMLRe
 
 
 @router.post("/categories/{category_id}/delete")
-def delete(category_id: str, agent: AgentDep, actor: ActorDep) -> RedirectResponse:
+def delete(category_id: str, agent: AgentDep, actor: ConsoleActorDep) -> RedirectResponse:
     """Forgets it."""
     agent.curation.delete(category_id, actor=actor)
     return _after(agent, category_id, "/categories")
 
 
 @router.post("/changes/{entry_id}/undo")
-def undo(entry_id: str, agent: AgentDep, actor: ActorDep) -> RedirectResponse:
+def undo(entry_id: str, agent: AgentDep, actor: ConsoleActorDep) -> RedirectResponse:
     """Takes a change back, and shows what it was about."""
     undone = agent.upkeep.undo(entry_id, actor=actor)
     living = undone.category_id in agent.names()

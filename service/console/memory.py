@@ -10,10 +10,10 @@ from fastapi.responses import HTMLResponse, RedirectResponse
 from core.scores import BEST
 from service.agent import Agent
 from service.console.change import done
-from service.console.pages import Page, query, render
+from service.console.pages import ConsoleActorDep, Page, query, render
 from service.console.score_chart import ScoreChart, score_chart
 from service.console.token_map import token_map
-from service.deps import ActorDep, AgentDep, SettingsDep, WorkDep
+from service.deps import AgentDep, SettingsDep, WorkDep
 from service.routes.memory import export_memory
 from service.schemas.memory import ExportQuery, MemoryInfo
 from store.records import Errand
@@ -63,14 +63,14 @@ def memory_map(request: Request, agent: AgentDep) -> HTMLResponse:
 
 
 @router.post("/calibrate")
-def calibrate(agent: AgentDep, actor: ActorDep, percent: Annotated[float | None, Form(ge=0.01, le=50)] = None) -> RedirectResponse:
+def calibrate(agent: AgentDep, actor: ConsoleActorDep, percent: Annotated[float | None, Form(ge=0.01, le=50)] = None) -> RedirectResponse:
     """Keeps a rate; an empty field goes back to the setting's."""
     agent.upkeep.calibrate(None if percent is None else percent / 100, actor=actor)
     return _after(agent, "calibrate")
 
 
 @router.post("/backup")
-async def backup(agent: AgentDep, work: WorkDep, settings: SettingsDep, actor: ActorDep) -> RedirectResponse:
+async def backup(agent: AgentDep, work: WorkDep, settings: SettingsDep, actor: ConsoleActorDep) -> RedirectResponse:
     """Copies all of it beside the memory."""
     await work.run_endless(lambda: agent.upkeep.backup(settings.backups, actor=actor))
     return _after(agent, "backup")
@@ -78,7 +78,7 @@ async def backup(agent: AgentDep, work: WorkDep, settings: SettingsDep, actor: A
 
 @router.post("/export")
 async def export(
-    agent: AgentDep, work: WorkDep, after: BackgroundTasks, actor: ActorDep, category: Annotated[list[str] | None, Form()] = None
+    agent: AgentDep, work: WorkDep, after: BackgroundTasks, actor: ConsoleActorDep, category: Annotated[list[str] | None, Form()] = None
 ) -> Response:
     """The chosen categories as a file, all where none are."""
     return await export_memory(ExportQuery(category_id=category or []), agent, work, after, actor)

@@ -14,7 +14,7 @@ from service.agent import Agent
 from service.console.alignment import aligned_scene
 from service.console.change import Name
 from service.console.evidence import Hypothesis, Matrix, Stage
-from service.console.pages import Page, render
+from service.console.pages import ConsoleActorDep, Page, render
 from service.console.words import called
 from service.deps import AgentDep, CallerDep, WorkDep
 from service.features import pose_details_from_arrays
@@ -108,7 +108,7 @@ def observation_scene(observation_id: str, agent: AgentDep) -> JSONResponse:
 @router.post("/{observation_id}/correct")
 async def observation_correct(
     observation_id: str,
-    caller: CallerDep,
+    actor: ConsoleActorDep,
     agent: AgentDep,
     work: WorkDep,
     category_id: Annotated[str, Form()] = "",
@@ -116,7 +116,7 @@ async def observation_correct(
 ) -> Response:
     """What it was really of; a new category where none is named."""
     given = (category_id or None, None if category_id else name.strip() or None)
-    await work.run(lambda: agent.curation.correct(observation_id, *given, actor=caller.as_actor("console")))
+    await work.run(lambda: agent.curation.correct(observation_id, *given, actor=actor))
     return Response(status_code=204, headers={"HX-Refresh": "true"})
 
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 from urllib.parse import urlencode
 
 from anyio.to_thread import run_sync
-from fastapi import Request, Response
+from fastapi import Depends, Request, Response
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import HTMLResponse, RedirectResponse
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
@@ -17,6 +17,7 @@ from core.errors import OneLookError
 from service.auth import Caller
 from service.console.assets import asset_url
 from service.console.words import FILTERS
+from service.deps import CallerDep
 from service.errors import problem_of, validation_problem
 from service.guarded import Answering, GuardedRoute
 from service.refusals import NoKey
@@ -30,6 +31,14 @@ HEADERS = {
     "form-action 'self'; base-uri 'none'; frame-ancestors 'none'",
     "Cache-Control": "private, no-cache",
 }
+
+
+def _at_the_console(caller: CallerDep) -> str | None:
+    return caller.as_actor("console")
+
+
+ConsoleActorDep = Annotated[str | None, Depends(_at_the_console)]
+"""Who changes something on a page, for the audit trail: browsers send no X-Actor."""
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from fastapi.responses import HTMLResponse
 from core.errors import Unavailable
 from service.auth import Caller
 from service.console.demo import OBJECTS, Demo
-from service.console.pages import Page, render
+from service.console.pages import ConsoleActorDep, Page, render
 from service.deps import AgentDep, CallerDep, DemoDep, SettingsDep
 
 router = APIRouter(prefix="/try", route_class=Page, include_in_schema=False)
@@ -35,9 +35,9 @@ def demo(request: Request, agent: AgentDep, caller: CallerDep, episode: DemoDep)
 
 
 @router.post("/demo")
-def demo_start(request: Request, agent: AgentDep, caller: CallerDep, episode: DemoDep) -> HTMLResponse:
+def demo_start(request: Request, agent: AgentDep, caller: CallerDep, actor: ConsoleActorDep, episode: DemoDep) -> HTMLResponse:
     """Begins one."""
-    episode.start(agent.memory, _own_address(request), actor=caller.as_actor("console"))
+    episode.start(agent.memory, _own_address(request), actor=actor)
     return render(request, "demo.html", **_told(episode, caller, False))
 
 

@@ -1,4 +1,4 @@
-"""How numbers and times are worded on a page."""
+"""How numbers, times and changes are worded on a page."""
 
 from __future__ import annotations
 

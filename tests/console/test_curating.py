@@ -65,7 +65,7 @@ def test_one_goes_from_the_grid_to_a_category(tab, cup):
     page.get_by_role("link", name="cup").click()
     expect(page.get_by_role("heading", name="cup", level=1)).to_be_visible()
     expect(
-        page.get_by_role("img", name="View 0 in the colours", exact=False).or_(page.get_by_alt_text(re.compile("View 0 parts"))).first
+        page.get_by_role("img", name="View 1 in the colours", exact=False).or_(page.get_by_alt_text(re.compile("View 1 parts"))).first
     ).to_be_visible()
     expect(page.locator("#nearest + *, .nearest").get_by_text("tv").first).to_be_visible()
 

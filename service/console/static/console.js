@@ -29,19 +29,13 @@ wordTimes();
 setInterval(wordTimes, 30_000);
 document.addEventListener("htmx:load", (event) => wordTimes(event.detail.elt));
 
-// A failure to reach the service is told, once, near what was pressed last.
-export function notice(text, bad = false) {
+// Failures to reach the service are told in a corner, the last one for a few seconds.
+document.addEventListener("htmx:sendError", () => {
   const element = document.createElement("p");
-  element.className = bad ? "note bad" : "note";
-  element.textContent = text;
+  element.className = "note bad";
+  element.textContent = "The service cannot be reached.";
   document.getElementById("notices").replaceChildren(element);
   setTimeout(() => element.remove(), 6000);
-}
-
-document.addEventListener("htmx:sendError", () => notice("The service cannot be reached.", true));
-document.addEventListener("htmx:afterRequest", (event) => {
-  const told = event.detail.xhr?.getResponseHeader("X-Notice");
-  if (told) notice(decodeURIComponent(told));
 });
 
 // Tabs that htmx answers: the one pressed last is the current one.

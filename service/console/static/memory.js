@@ -23,6 +23,7 @@ form?.addEventListener("submit", (event) => {
   const request = new XMLHttpRequest();
   request.open("POST", "/v1/memory/import");
   request.setRequestHeader("Content-Type", "application/zip");
+  request.setRequestHeader("X-Actor", "console");
   request.setRequestHeader("Idempotency-Key", Array.from(crypto.getRandomValues(new Uint8Array(16)), (each) => each.toString(16).padStart(2, "0")).join(""));
   request.responseType = "json";
   request.upload.addEventListener("progress", ({ loaded, total }) => {

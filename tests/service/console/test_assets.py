@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import hashlib
 import re
+from collections import Counter
 
 import pytest
 
 from service.console.assets import FOLDER, asset_url
 
 VENDOR = FOLDER / "vendor"
+SHEETS = [(FOLDER / f"{name}.css").read_text() for name in ("base", "pictures", "pages")]
+"""In the order in which pages link them."""
 LISTED = re.findall(r"^\| `([^`]+)` .*`([0-9a-f]{64})` \|$", (VENDOR / "README.md").read_text(), re.MULTILINE)
 
 
@@ -45,6 +48,31 @@ def test_nothing_outside_the_folder_is_served(client):
 def test_own_files_ask_for_nothing_from_elsewhere(path):
     addresses = set(re.findall(r"https?://[^\s\"')]+", path.read_text()))
     assert addresses <= {"http://www.w3.org/2000/svg"}
+
+
+def declarations(sheet: str) -> list[tuple[str, str]]:
+    """(selector, property) of every rule that holds for all screens."""
+    plain = re.sub(r"/\*.*?\*/|@[^{;]*\{(?:[^{}]*\{[^{}]*\})*[^{}]*\}", "", sheet, flags=re.DOTALL)
+    return [
+        (selector.strip(), line.partition(":")[0].strip())
+        for selectors, body in re.findall(r"([^{}]+)\{([^{}]*)\}", plain)
+        for selector in re.split(r",(?![^(]*\))", selectors)
+        for line in body.split(";")
+        if line.strip()
+    ]
+
+
+def test_no_rule_of_a_class_is_undone_by_a_later_one():
+    found = Counter(each for sheet in SHEETS for each in declarations(sheet) if each[0].startswith("."))
+    assert len(found) > 500
+    assert [each for each, times in found.items() if times > 1] == []
+
+
+def test_every_class_that_is_styled_is_on_a_page():
+    sources = [path for path in FOLDER.parent.rglob("*.*") if path.suffix in (".html", ".js", ".py") and VENDOR not in path.parents]
+    text = "\n".join(path.read_text() for path in sources)
+    styled = {name for sheet in SHEETS for selector, _ in declarations(sheet) for name in re.findall(r"\.([a-z][\w-]*)", selector)}
+    assert [name for name in sorted(styled) if not re.search(rf"(?<![\w-]){re.sub(r'[0-9]+$', '', name)}", text)] == []
 
 
 def test_every_file_is_installed():

@@ -146,6 +146,11 @@ def test_a_rename_and_the_way_back(client, cup):
     assert client.get(f"/v1/categories/{cup}").json()["name"] == "cup"
 
 
+def test_a_change_says_that_it_was_made_at_the_console(client, cup):
+    follow(client, f"/categories/{cup}/rename", name="goblet")
+    assert client.get("/v1/memory/audit").json()["entries"][0]["actor"] == "console"
+
+
 def test_a_merge_tells_what_it_changes_changes_it_and_can_be_taken_back(client, cup, mug):
     assert "mug" in client.get(f"/categories/{cup}/merge").text
     preview = client.get(f"/categories/{cup}/merge", params={"into": mug}).text
