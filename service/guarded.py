@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable, Coroutine, Iterable
 from typing import Any
 
-from fastapi import Request, Response, WebSocket
+from fastapi import APIRouter, FastAPI, Request, Response, WebSocket
 from fastapi.routing import APIRoute
 
 from service.access import needed_role
@@ -34,6 +34,15 @@ class GuardedRoute(APIRoute):
     def around(self, answer: Answering) -> Answering:
         """What else a kind of routes does; here nothing."""
         return answer
+
+
+def include(app: FastAPI, routers: Iterable[APIRouter]) -> None:
+    """Puts routes into the application. Raises LookupError for one that would let everybody in."""
+    for router in routers:
+        for route in router.routes:
+            if isinstance(route, APIRoute) and not isinstance(route, GuardedRoute):
+                raise LookupError(f"the route {route.name!r} asks nobody who they are: give its APIRouter a route_class of GuardedRoute's kind")
+        app.include_router(router)
 
 
 def admit_socket(name: str) -> Callable[[WebSocket], Coroutine[Any, Any, None]]:

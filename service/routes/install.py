@@ -5,6 +5,7 @@ from __future__ import annotations
 from fastapi import FastAPI
 
 from service import openapi
+from service.guarded import include
 from service.routes import categories, events, goals, health, memory, observations, scans, track
 from service.state import Made
 
@@ -16,6 +17,5 @@ MADE: Made = {path: made for each in ENDPOINTS for path, made in getattr(each, "
 
 def install(app: FastAPI) -> None:
     """All of them, and their document."""
-    for router in ROUTERS:
-        app.include_router(router)
+    include(app, ROUTERS)
     openapi.install(app, [route for router in ROUTERS for route in router.routes])

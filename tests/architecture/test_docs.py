@@ -15,6 +15,7 @@ from typer.main import get_command
 from clients.cli import app
 from clients.datasets.folders import find_sequences, load_burst
 from service.app import create_app
+from service.console.pages import NAVIGATION
 from service.settings import Settings
 
 ROOT = Path(__file__).parents[2]
@@ -89,6 +90,11 @@ def method_of(call: str) -> str:
 def test_documented_endpoints_exist() -> None:
     for method, path in re.findall(r"`(GET|POST|PATCH|DELETE|PUT) (/[^`]*)`", TEXT):
         assert (method, path) in ENDPOINTS
+
+
+@pytest.mark.parametrize("path", [link.path for link in NAVIGATION])
+def test_every_page_of_the_console_is_documented(path: str) -> None:
+    assert f"| `{path}` |" in (ROOT / "docs" / "console.md").read_text()
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)

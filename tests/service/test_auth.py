@@ -7,6 +7,7 @@ from datetime import timedelta
 from typing import Any
 
 import pytest
+from fastapi import APIRouter, FastAPI
 from fastapi.testclient import TestClient
 from starlette.testclient import WebSocketDenialResponse
 
@@ -18,6 +19,7 @@ from core.views import Burst
 from service.access import ACCESS, needed_role
 from service.app import create_app
 from service.errors import KINDS
+from service.guarded import include
 from service.rate import RateLimit
 from service.settings import Settings
 from store.keys import ROLES
@@ -97,6 +99,13 @@ def test_the_table_has_every_operation_and_nothing_else() -> None:
 def test_a_route_that_the_table_lacks_is_told_where_the_table_is():
     with pytest.raises(LookupError, match=r"'things'.*service/access\.py"):
         needed_role("things")
+
+
+def test_a_route_that_asks_nobody_who_they_are_does_not_start():
+    router = APIRouter()
+    router.get("/v1/things")(lambda: {})
+    with pytest.raises(LookupError, match="route_class"):
+        include(FastAPI(), [router])
 
 
 def test_the_scheme_is_documented() -> None:
