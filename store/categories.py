@@ -21,7 +21,7 @@ from store.connection import Connection, Row, new_id
 from store.contents import files_of
 from store.folders import Files
 from store.instances import Instances, insert_instance
-from store.overview import Listing, Order, Summary, listing
+from store.overview import Listing, Order, Summary, listing, summary
 from store.records import Category
 from store.scans import OPEN
 from store.times import now
@@ -150,8 +150,7 @@ class Categories:
 
     def summary(self, category_id: str) -> Summary:
         """One as `listing` has it. Raises NotFound."""
-        (found,) = listing(self._connection, 1, 0, called=self.get(category_id).id).categories
-        return found
+        return summary(self._connection, self.get(category_id).id)
 
     def burst(self, category_id: str) -> Burst:
         """All reference views. Raises NotFound, and Unavailable where one is damaged."""

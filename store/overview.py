@@ -52,7 +52,7 @@ class Listing:
 
 
 def listing(connection: Connection, limit: int, offset: int, *, order: Order = "name", called: str | None = None) -> Listing:
-    """Those whose name or id has `called` in it, in this order."""
+    """Those whose name has `called` in it, or whose id begins so, in this order."""
     where, parameters = "", []
     if called:
         where = " AND (instr(lower(coalesce(c.name, '')), lower(?)) OR instr(c.id, ?) = 1)"
@@ -60,3 +60,9 @@ def listing(connection: Connection, limit: int, offset: int, *, order: Order = "
     rows = connection.rows(f"{QUERY}{where} ORDER BY {ORDERS[order]} LIMIT ? OFFSET ?", *parameters, limit, offset)
     (total,) = connection.rows(f"SELECT count(*) AS n FROM categories c WHERE c.removed_by IS NULL{where}", *parameters)
     return Listing(tuple(Summary(**row) for row in rows), total["n"])
+
+
+def summary(connection: Connection, category_id: str) -> Summary:
+    """Of a category that is there."""
+    (row,) = connection.rows(f"{QUERY} AND c.id = ?", category_id)
+    return Summary(**row)

@@ -26,6 +26,8 @@ SELECT = """
 OPEN_STATES: tuple[ScanState, ...] = ("requested", "collecting")
 """Views may still come."""
 OPEN = f"state IN {OPEN_STATES}"
+IN_PROGRESS = f"{OPEN} AND expires_at > ?"
+"""Of `now`: a scan whose time is over is expired, also while its row does not say so yet."""
 
 
 class Scans:
@@ -51,7 +53,7 @@ class Scans:
 
     def in_progress(self, limit: int) -> list[Scan]:
         """Those that views may still come for, the latest begun first."""
-        rows = self._connection.rows(f"{SELECT} WHERE s.{OPEN} AND s.expires_at > ? ORDER BY s.rowid DESC LIMIT ?", now(), limit)
+        rows = self._connection.rows(f"{SELECT} WHERE {IN_PROGRESS} ORDER BY s.rowid DESC LIMIT ?", now(), limit)
         return [_scan(row) for row in rows]
 
     def states(self) -> dict[str, int]:

@@ -91,7 +91,7 @@ def category_rgb(category_id: str, view: View, agent: AgentDep, side: Side = Non
 
 @router.get("/{category_id}/views/{view}/depth.png", response_class=Response, responses=PNG_RESPONSES)
 def category_depth(category_id: str, view: View, agent: AgentDep, side: Side = None) -> Response:
-    """Its depth for the eye: near is bright, far is dark, not measured is black."""
+    """Its depth for the eye: near is bright, far is dark; what was not measured is filled in at half brightness."""
     return png(CategoryGallery(agent, category_id).depth(view), side)
 
 

@@ -46,7 +46,6 @@ def problems(*statuses: int) -> dict[int | str, dict[str, Any]]:
 
 
 DESCRIPTIONS = {
-    400: "The body could not be read",
     401: "A key is missing, or not valid",
     403: "The key's role does not allow this",
     404: "There is no such thing",

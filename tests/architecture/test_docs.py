@@ -16,6 +16,7 @@ from clients.cli import app
 from clients.datasets.folders import find_sequences, load_burst
 from service.app import create_app
 from service.console.pages import NAVIGATION
+from service.errors import KINDS
 from service.settings import Settings
 
 ROOT = Path(__file__).parents[2]
@@ -85,6 +86,12 @@ def method_of(call: str) -> str:
     if named:
         return named[1]
     return "POST" if re.search(r" (-F|-d|--data-binary) ", call) or "/complete" in call else "GET"
+
+
+@pytest.mark.parametrize(("status", "kind"), [*((status, kind) for _, status, kind, _ in KINDS), (500, "unexpected")])
+def test_every_kind_of_error_is_documented(status: int, kind: str) -> None:
+    (row,) = re.findall(rf"^\| {status} \|(.*)\|$", HTTP.partition("\n## Errors\n")[2], re.MULTILINE)
+    assert f"`{kind}`" in row
 
 
 def test_documented_endpoints_exist() -> None:

@@ -76,6 +76,12 @@ def test_one_that_was_never_seen_again_was_seen_when_it_was_learnt(shelf: Memory
     assert (cup.recognised, cup.without_pose, cup.last_seen) == (0, 0, category.created_at)
 
 
+def test_a_summary_is_of_the_id_whatever_others_are_called(shelf: Memory, category: Category) -> None:
+    nameless = next(each for each in shelf.categories.all() if each.name is None)
+    shelf.categories.rename(category.id, nameless.id)
+    assert shelf.categories.summary(nameless.id).id == nameless.id
+
+
 def test_what_is_deleted_is_on_no_page(shelf: Memory, other: Category) -> None:
     shelf.categories.delete(other.id)
     assert [each.name for each in shelf.categories.listing(9).categories] == ["Bowl", "cup", None]

@@ -115,3 +115,11 @@ def test_scans_are_counted_by_state(memory: Memory, request_for_views: ScanReque
     with memory._connection.housekeeping() as db:
         db.execute("UPDATE scans SET expires_at = '2000-01-01' WHERE id = ?", [over.id])
     assert memory.scans.states() == {"requested": 1, "collecting": 1, "expired": 1}
+
+
+def test_a_scan_whose_time_is_over_is_in_progress_nowhere(memory: Memory, request_for_views: ScanRequest) -> None:
+    begun, over = (memory.scans.create(request_for_views) for _ in range(2))
+    with memory._connection.housekeeping() as db:
+        db.execute("UPDATE scans SET expires_at = '2000-01-01' WHERE id = ?", [over.id])
+    assert [each.id for each in memory.scans.in_progress(9)] == [begun.id]
+    assert memory.sizes().scans == 1
