@@ -19,13 +19,12 @@ import cv2
 import numpy as np
 
 from clients.datasets import folders
+from clients.datasets.folders import CAMERAS, TRUTH
 from clients.datasets.images import is_image, read_depth, read_mask, read_rgb
 from core.errors import InvalidInput
 from core.sim3 import Sim3
 from core.views import Camera, FloatArray, View
 
-TRUTH = "scene_gt.json"
-CAMERAS = "scene_camera.json"
 TURNS = 72
 """Rotations that stand for a continuous symmetry: 5° apart."""
 
@@ -71,7 +70,8 @@ class BopReader(folders.Reader):
         if depth_file.exists():
             depth_m = read_depth(depth_file, entry["depth_scale"] / 1000)
         mask = read_mask(mask_file) if (masks or not sight.alone) and mask_file.exists() else None
-        return View(read_rgb(sight.image), depth_m, _camera(entry, truth[sight.key][sight.index]), mask)
+        within = f"{scene / CAMERAS}: {sight.key}."
+        return View(read_rgb(sight.image), depth_m, _camera(entry, truth[sight.key][sight.index], within), mask)
 
 
 def find_sequences(root: Path) -> list[folders.Sequence]:
@@ -110,17 +110,18 @@ def _sequence(scene: Path, instance: str, number: int, sights: list[Sight], mode
         sides = np.array([model["size_x"], model["size_y"], model["size_z"]]) / 1000
         centre = np.array([model["min_x"], model["min_y"], model["min_z"]]) / 1000 + sides / 2
         frame = Sim3(float(np.linalg.norm(sides)), np.eye(3), centre)
-        pose = _camera(cameras[sights[0].key], first).world_from_camera @ _camera_from_model(first)
+        within = f"{scene / CAMERAS}: {sights[0].key}."
+        pose = _camera(cameras[sights[0].key], first, within).world_from_camera @ _camera_from_model(first)
         world_from_model, longest = Sim3.from_matrix(pose) @ frame, float(sides.max())
     images = tuple(sight.image for sight in sights)
     symmetries = _symmetries(model or {}, f"models_info.json: {number}")
     return folders.Sequence(scene, f"{number:06}", instance, images, world_from_model, symmetries, BopReader(tuple(sights)), longest)
 
 
-def _camera(entry: Mapping[str, Any], truth: Mapping[str, Any]) -> Camera:
+def _camera(entry: Mapping[str, Any], truth: Mapping[str, Any], within: str) -> Camera:
     if "cam_R_w2c" in entry:
-        return folders.read_camera(dict(entry))
-    return Camera(np.array(entry["cam_K"], dtype=float).reshape(3, 3), np.linalg.inv(_camera_from_model(truth)))
+        return folders.read_camera(entry, within)
+    return Camera(folders.read_numbers(entry, "cam_K", (3, 3), within), np.linalg.inv(_camera_from_model(truth)))
 
 
 def _camera_from_model(truth: Mapping[str, Any]) -> FloatArray:

@@ -7,8 +7,9 @@ Other data sets are read by the modules beside this one, each a `Format` that it
 from __future__ import annotations
 
 import json
+import math
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from collections.abc import Sequence as Indices
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,6 +24,8 @@ from core.views import Burst, Camera, FloatArray, View, require_rotation
 
 ABOUT = "sequence.json"
 """The file that makes a folder a sequence."""
+CAMERAS = "scene_camera.json"
+TRUTH = "scene_gt.json"
 SYMMETRY_SIDES = {9: 3, 16: 4}
 """Rows of a symmetry's matrix, by how many numbers it has."""
 
@@ -48,12 +51,12 @@ class LayoutReader(Reader):
 
     def read(self, sequence: Sequence, indices: Indices[int], masks: bool) -> list[View]:
         """See `Reader`."""
-        cameras = read_json(sequence.path / "scene_camera.json")
+        cameras = read_json(sequence.path / CAMERAS)
         return [_load_view(sequence, sequence.images[index], cameras, masks) for index in indices]
 
     def files(self, sequence: Sequence) -> list[Path]:
         """See `Reader`."""
-        return [*sequence.images, *sorted((sequence.path / "depth").glob("*.png")), sequence.path / "scene_camera.json"]
+        return [*sequence.images, *sorted((sequence.path / "depth").glob("*.png")), sequence.path / CAMERAS]
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,29 +130,53 @@ def _sequence_folders(root: Path) -> Iterator[Path]:
 
 def _load_view(sequence: Sequence, image: Path, cameras: dict[str, Any], masks: bool) -> View:
     rgb = read_rgb(image)
-    entry = cameras.get(str(int(image.stem)))
+    key = _number(image) if cameras else ""
+    entry = cameras.get(key)
     if entry is None or "cam_R_w2c" not in entry:
         return View(rgb)
+    within = f"{sequence.path / CAMERAS}: {key}."
     depth_file = sequence.path / "depth" / f"{image.stem}.png"
     depth_m = None
     if depth_file.exists():
-        depth_m = read_depth(depth_file, entry["depth_scale"] / 1000)
+        depth_m = read_depth(depth_file, float(read_numbers(entry, "depth_scale", (), within)) / 1000)
     mask_file = sequence.path / "mask_visib" / f"{image.stem}_000000.png"
     mask = read_mask(mask_file) if masks and mask_file.exists() else None
-    return View(rgb, depth_m, read_camera(entry), mask)
+    return View(rgb, depth_m, read_camera(entry, within), mask)
 
 
-def read_camera(entry: dict[str, Any]) -> Camera:
-    """From an entry of BOP's scene_camera.json that has a pose."""
-    rotation = np.array(entry["cam_R_w2c"], dtype=float).reshape(3, 3)
+def _number(image: Path) -> str:
+    """What an image is called by in the scene's files."""
+    if not (image.stem.isascii() and image.stem.isdecimal()):
+        raise InvalidInput(str(image), f"expected a number for a name, such as 000000{image.suffix}: by it {CAMERAS} tells its camera")
+    return str(int(image.stem))
+
+
+def read_camera(entry: Mapping[str, Any], within: str) -> Camera:
+    """From an entry of BOP's scene_camera.json that has a pose. Raises as `read_numbers` does."""
+    rotation = read_numbers(entry, "cam_R_w2c", (3, 3), within)
     world_from_camera = np.eye(4)
     world_from_camera[:3, :3] = rotation.T
-    world_from_camera[:3, 3] = -rotation.T @ np.array(entry["cam_t_w2c"], dtype=float) / 1000
-    return Camera(np.array(entry["cam_K"], dtype=float).reshape(3, 3), world_from_camera)
+    world_from_camera[:3, 3] = -rotation.T @ read_numbers(entry, "cam_t_w2c", (3,), within) / 1000
+    return Camera(read_numbers(entry, "cam_K", (3, 3), within), world_from_camera)
+
+
+def read_numbers(entry: Mapping[str, Any], name: str, shape: tuple[int, ...], within: str) -> FloatArray:
+    """An entry's numbers, row by row, as an array of `shape`. Raises InvalidInput naming them after `within`, such as `FILE: 7.`."""
+    try:
+        return np.array(entry[name], dtype=float).reshape(shape)
+    except (KeyError, TypeError, ValueError):
+        count = math.prod(shape)
+        expected = f"{count} numbers, row by row" if count > 1 else "a number"
+        raise InvalidInput(f"{within}{name}", f"expected {expected}, found {entry.get(name)!r:.80}") from None
 
 
 def _read_sequence(folder: Path) -> Sequence:
-    about = json.loads((folder / ABOUT).read_text())
+    about = read_json(folder / ABOUT)
+    for name in ("category", "instance"):
+        if not isinstance(about.get(name), str):
+            raise InvalidInput(f"{folder / ABOUT}: {name}", f"expected a name, found {about.get(name)!r:.80}")
+    if not (folder / "rgb").is_dir():
+        raise InvalidInput(str(folder), f"has no folder rgb; expected its images there, beside {ABOUT}")
     images = tuple(sorted(path for path in (folder / "rgb").iterdir() if is_image(path)))
     listed = enumerate(about.get("symmetries") or ())
     symmetries = tuple(read_symmetry(matrix, f"{folder / ABOUT}: symmetries[{index}]") for index, matrix in listed)
@@ -180,19 +207,28 @@ def read_symmetry(matrix: Any, field: str) -> FloatArray:
 
 
 def _world_from_model(folder: Path, about: dict[str, Any]) -> Sim3 | None:
-    truth, cameras = read_json(folder / "scene_gt.json"), read_json(folder / "scene_camera.json")
-    if not truth or not cameras:
+    truth, cameras = read_json(folder / TRUTH), read_json(folder / CAMERAS)
+    first = next((key for key in truth if truth[key] and key in cameras), None)
+    if first is None:
         return None
-    first = next(iter(truth))
-    pose, camera = truth[first][0], read_camera(cameras[first])
+    pose, within = truth[first][0], f"{folder / TRUTH}: {first}[0]."
+    camera = read_camera(cameras[first], f"{folder / CAMERAS}: {first}.")
     camera_from_model = Sim3(
-        about["model_scale_mm"] / 1000,
-        np.array(pose["cam_R_m2c"], dtype=float).reshape(3, 3),
-        np.array(pose["cam_t_m2c"], dtype=float) / 1000,
+        float(read_numbers(about, "model_scale_mm", (), f"{folder / ABOUT}: ")) / 1000,
+        read_numbers(pose, "cam_R_m2c", (3, 3), within),
+        read_numbers(pose, "cam_t_m2c", (3,), within) / 1000,
     )
     return Sim3(1.0, camera.world_from_camera[:3, :3], camera.world_from_camera[:3, 3]) @ camera_from_model
 
 
 def read_json(path: Path) -> dict[str, Any]:
-    """A JSON object; empty where there is no file."""
-    return dict(json.loads(path.read_text())) if path.exists() else {}
+    """A JSON object; empty where there is no file. Raises InvalidInput where it is none."""
+    if not path.exists():
+        return {}
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise InvalidInput(str(path), f"is not JSON ({error})") from None
+    if not isinstance(found, dict):
+        raise InvalidInput(str(path), f"expected a JSON object, found {found!r:.80}")
+    return found

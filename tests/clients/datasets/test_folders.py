@@ -6,7 +6,9 @@ import json
 import os
 import shutil
 from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -68,6 +70,57 @@ def test_masks_are_given_only_when_asked_for(recordings: list[Sequence]) -> None
 def test_a_folder_without_sequences_is_named(tmp_path: Path) -> None:
     with pytest.raises(InvalidInput, match=r"sequence\.json"):
         find_sequences(tmp_path)
+
+
+def edit(file: str, change: Callable[[Any], object]) -> Callable[[Path], object]:
+    """Of a copied recording: what `change` does to what a file of it holds."""
+
+    def edited(folder: Path) -> None:
+        content = json.loads((folder / file).read_text())
+        change(content)
+        (folder / file).write_text(json.dumps(content))
+
+    return edited
+
+
+@pytest.mark.parametrize(
+    ("damage", "field", "says"),
+    [
+        (lambda folder: (folder / "sequence.json").write_text("{"), "sequence.json", "is not JSON"),
+        (lambda folder: (folder / "sequence.json").write_text("[]"), "sequence.json", "expected a JSON object"),
+        (edit("sequence.json", lambda about: about.pop("category")), "sequence.json: category", "expected a name, found None"),
+        (edit("sequence.json", lambda about: about.pop("model_scale_mm")), "sequence.json: model_scale_mm", "expected a number"),
+        (lambda folder: shutil.rmtree(folder / "rgb"), "", "has no folder rgb"),
+        (
+            lambda folder: (folder / "rgb" / "000000.jpg").rename(folder / "rgb" / "left.jpg"),
+            "rgb/left.jpg",
+            "expected a number for a name, such as 000000.jpg",
+        ),
+        (edit("scene_camera.json", lambda cameras: cameras["0"]["cam_K"].pop()), "scene_camera.json: 0.cam_K", "expected 9 numbers"),
+        (
+            edit("scene_camera.json", lambda cameras: cameras["1"].pop("depth_scale")),
+            "scene_camera.json: 1.depth_scale",
+            "expected a number",
+        ),
+    ],
+)
+def test_what_is_wrong_with_a_recording_is_named(
+    recordings: list[Sequence], tmp_path: Path, damage: Callable[[Path], object], field: str, says: str
+) -> None:
+    folder = shutil.copytree(recordings[0].path, tmp_path / "copy")
+    damage(folder)
+    with pytest.raises(InvalidInput, match=says) as caught:
+        load_burst(find_sequences(folder)[0])
+    assert caught.value.field == str(folder / field) if field else str(folder)
+
+
+def test_images_without_cameras_may_have_any_name(recordings: list[Sequence], tmp_path: Path) -> None:
+    folder = shutil.copytree(recordings[0].path, tmp_path / "copy")
+    for file in ("scene_camera.json", "scene_gt.json"):
+        (folder / file).unlink()
+    (folder / "rgb" / "000000.jpg").rename(folder / "rgb" / "left.jpg")
+    (sequence,) = find_sequences(folder)
+    assert {view.camera for view in load_burst(sequence).views} == {None}
 
 
 QUARTER_TURN = [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
