@@ -41,7 +41,7 @@ def include(app: FastAPI, routers: Iterable[APIRouter]) -> None:
     for router in routers:
         for route in router.routes:
             if isinstance(route, APIRoute) and not isinstance(route, GuardedRoute):
-                raise LookupError(f"the route {route.name!r} asks nobody who they are: give its APIRouter the route_class of a GuardedRoute")
+                raise LookupError(f"the route {route.name!r} asks nobody who they are: its APIRouter takes a GuardedRoute as route_class")
         app.include_router(router)
 
 
