@@ -32,7 +32,7 @@ def burst_parts(burst: Burst, frame: str | None = None) -> list[Part]:
     parts = [("burst", ("burst.json", json.dumps(about).encode(), "application/json"))]
     parts += [_image("rgb", index, encode_colour(view)) for index, view in enumerate(views)]
     if _all_or_none("depth", [view.depth_m for view in views]):
-        parts += [_image("depth", index, encode_depth(view, index)) for index, view in enumerate(views)]
+        parts += [_image("depth", index, encode_depth(view, f"views[{index}].depth")) for index, view in enumerate(views)]
     if _all_or_none("mask", [view.mask for view in views]):
         parts += [_image("mask", index, encode_mask(view)) for index, view in enumerate(views)]
     return parts
@@ -81,11 +81,11 @@ def encode_mask(view: View) -> bytes:
     return encode_png(np.asarray(view.mask, dtype=np.uint8) * 255)
 
 
-def encode_depth(view: View, index: int) -> bytes:
-    """The depth of view number `index` as a 16-bit PNG in units of DEPTH_UNIT_M. Raises InvalidInput where it reaches too far."""
+def encode_depth(view: View, field: str) -> bytes:
+    """A view's depth as a 16-bit PNG in units of DEPTH_UNIT_M. Raises InvalidInput naming `field` where it reaches too far."""
     assert view.depth_m is not None
     units = np.round(view.depth_m / DEPTH_UNIT_M)
     if units.max() > np.iinfo(np.uint16).max:
         reach_m = np.iinfo(np.uint16).max * DEPTH_UNIT_M
-        raise InvalidInput(f"views[{index}].depth", f"reaches {view.depth_m.max():.1f} m; set what is beyond {reach_m:.0f} m to 0")
+        raise InvalidInput(field, f"reaches {view.depth_m.max():.1f} m; set what is beyond {reach_m:.0f} m to 0")
     return encode_png(units.astype(np.uint16))

@@ -85,7 +85,7 @@ class Conversation:
             "K": view.camera.K.tolist(),
             "world_from_camera": view.camera.world_from_camera.tolist(),
             "rgb": _base64(encode_colour(view)),
-            "depth": _base64(encode_depth(view, self._next)),
+            "depth": _base64(encode_depth(view, "depth")),
         }
         if view.mask is not None:
             message["mask"] = _base64(encode_mask(view))

@@ -87,7 +87,7 @@ def paper(
 def discovery(
     data: Data,
     score: Annotated[list[str] | None, typer.Option(help="Score of the decision; may be repeated; all where left out.")] = None,
-    episodes: Annotated[int, typer.Option(min=1)] = 1000,
+    episodes: Annotated[int, typer.Option(min=1, help="Orders in which objects are met.")] = 1000,
     length: Annotated[int, typer.Option(min=1, help="Objects met in an episode.")] = 250,
     seed: Seed = 0,
     backbone: Backbone = BACKBONE,

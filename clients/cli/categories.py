@@ -78,8 +78,8 @@ def find(categories: Sequence[NamedT], which: str) -> NamedT:
     """The category that `which` names or whose id starts with it. Raises ClientError unless it is exactly one."""
     found = [each for each in categories if each.name == which] or [each for each in categories if each.id.startswith(which)]
     if len(found) != 1:
-        problem = "no category is" if not found else f"{len(found)} categories are"
-        raise ClientError(f"{problem} called {which!r} or has an id that starts so; `onelook categories list` shows them")
+        called = f"{len(found)} categories are called {which!r} or have" if found else f"no category is called {which!r} or has"
+        raise ClientError(f"{called} an id that starts so; `onelook categories list` shows them")
     return found[0]
 
 

@@ -13,7 +13,7 @@ from clients.cli.terminal import SOURCE, Json, console, errors, print_json, prog
 def samples(
     data: Annotated[Path, typer.Option(help="Folder of recorded objects to draw from.")],
     out: Annotated[Path, typer.Option(help="New folder for the small copies.")],
-    categories: Annotated[int, typer.Option(min=1)] = 5,
+    categories: Annotated[int, typer.Option(min=1, help="Categories to draw.")] = 5,
     instances: Annotated[int, typer.Option(min=1, help="Objects of each category.")] = 3,
     views: Annotated[int, typer.Option(min=2, help="Views of each object.")] = 12,
     seed: Annotated[int, typer.Option(help="Of the draw.")] = 0,

@@ -114,6 +114,15 @@ def test_every_command_has_json() -> None:
     assert lacking <= WITHOUT_JSON
 
 
+def test_every_option_says_what_it_is_for() -> None:
+    def silent(command: Any, name: str) -> Iterator[str]:
+        yield from (f"{name} {each.name}" for each in command.params if each.name != "help" and not each.help)
+        for child, below in getattr(command, "commands", {}).items():
+            yield from silent(below, f"{name} {child}")
+
+    assert list(silent(get_command(app), "onelook")) == []
+
+
 def test_the_demo_writes_its_report(url: str, recordings: list[Sequence], tmp_path: Path) -> None:
     done = onelook("simulate", "--url", url, "--data", recordings[0].path.parent, "--out", tmp_path / "demo", "--views", 3)
     assert done.exit_code == 0, done.output

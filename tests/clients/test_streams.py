@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from clients.answers.categories import Category
 from clients.asynchronous import AsyncRobotClient
 from clients.events import Event, EventReader
 from clients.robot import RobotClient
+from clients.tracking import Conversation
 from core.errors import InvalidInput
 from core.views import Burst, View
 
@@ -71,6 +73,13 @@ def test_what_cannot_be_followed_is_said(robot: RobotClient, burst: Burst) -> No
         pass
     with robot.track() as track, pytest.raises(InvalidInput, match="depth"):
         track.step(View(burst.views[0].rgb))
+
+
+def test_a_frames_depth_that_reaches_too_far_is_named(burst: Burst) -> None:
+    far = replace(burst.views[0], depth_m=np.full(burst.views[0].size, 80, np.float32))
+    with pytest.raises(InvalidInput) as caught:
+        Conversation().frame(far)
+    assert caught.value.field == "depth"
 
 
 def test_without_a_service_the_remedy_is_said() -> None:
