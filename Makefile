@@ -4,7 +4,7 @@ SHELL := /bin/bash
 .DELETE_ON_ERROR:
 .PHONY: help setup weights demo test lint types unit browser cluster serve bench soak fuzz mutants clean
 
-# The python to build the environment with: the newest of 3.10 and later on the PATH.
+# The python to build the environment with: the newest of 3.10 to 3.13 on the PATH.
 PYTHON ?= $(shell for name in python3.13 python3.12 python3.11 python3.10 python3 python; do \
 	$$name -c 'import sys; sys.exit(not (3, 10) <= sys.version_info[:2] < (3, 14))' 2>/dev/null && command -v $$name && break; done)
 # Where else to look for torch: https://download.pytorch.org/whl/cpu is small, PyPI's Linux build carries CUDA.

@@ -106,7 +106,7 @@ def assemble(
                     raise InvalidInput(f"views[{index}].{name}", f"is missing, while {why}; send K and world_from_camera for every view")
     views = []
     for index, image in enumerate(rgb):
-        with _naming(index):
+        with naming(f"views[{index}]."):
             K, pose = cameras[index] if given else (None, None)
             camera = Camera(K, pose) if K is not None and pose is not None else None
             views.append(plausible(View(image, depth_m[index] if depth_m else None, camera, mask[index] if mask else None)))
@@ -114,13 +114,13 @@ def assemble(
 
 
 @contextmanager
-def _naming(index: int) -> Iterator[None]:
-    """A camera or a view does not know its place in the burst; the caller's error names it."""
+def naming(within: str) -> Iterator[None]:
+    """A camera or a view does not know where in a request it is; the caller's error names its field behind `within`."""
     try:
         with np.errstate(over="ignore", invalid="ignore"):  # of numbers that are refused
             yield
     except InvalidInput as error:
-        raise InvalidInput(f"views[{index}].{error.field.partition('.')[2]}", error.message) from None
+        raise InvalidInput(within + error.field.partition(".")[2], error.message) from None
 
 
 def _about(part: str | bytes, limits: BurstLimits) -> BurstPart:

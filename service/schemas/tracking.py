@@ -14,6 +14,7 @@ from core.errors import InvalidInput
 from core.novelty import Outcome
 from core.tracking import TrackConfig
 from core.views import Camera, View
+from service.decoding import naming
 from service.images import decode_colour, decode_depth, decode_mask
 from service.plausibility import plausible
 from service.schemas.bursts import ViewPart, matrix
@@ -73,8 +74,9 @@ class FrameMessage(ViewPart):
         assert pose is not None
         depth_m = (decode_depth(self.depth, "depth") * self.depth_scale).astype(np.float32)
         mask = None if self.mask is None else decode_mask(self.mask, "mask")
-        with np.errstate(over="ignore", invalid="ignore"):  # of numbers that are refused
-            view = plausible(View(decode_colour(self.rgb, "rgb"), depth_m, Camera(K, pose), mask))
+        rgb = decode_colour(self.rgb, "rgb")
+        with naming(""):
+            view = plausible(View(rgb, depth_m, Camera(K, pose), mask))
         return Frame(self.id, view, arrived_s if self.time_s is None else self.time_s)
 
 

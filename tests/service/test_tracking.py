@@ -142,6 +142,8 @@ def test_a_moved_object_is_followed_once_its_new_place_is_sure(track, ball, came
         ({"rgb": "no base64!"}, "rgb"),
         ({"rgb": base64.b64encode(b"no image").decode()}, "rgb"),
         ({"K": None}, "K"),
+        ({"K": [[-1, 0, 0], [0, 1, 0], [0, 0, 1]]}, "K"),
+        ({"depth_scale": 1000}, "depth"),
         ({"world_from_camera": [[1, 2], [3, 4]]}, "world_from_camera"),
         ({"time_s": -1}, "time_s"),
         ({"surprise": 1}, "surprise"),

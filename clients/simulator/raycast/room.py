@@ -71,16 +71,13 @@ class Room:
     """Linear light that comes from everywhere above, shape (3,)."""
     ground: FloatArray
     """The same from below, thrown back by table and floor, shape (3,)."""
-    table_half_m: tuple[float, float]
-    """Half the table's length along x and y."""
 
 
 def make_room(rng: Generator) -> Room:
     """Another room for every generator."""
-    half = float(rng.uniform(0.55, 0.75)), float(rng.uniform(0.65, 0.95))
-    top = _surface(rng, 2 * half[0], 2 * half[1])
+    x, y, z, low = float(rng.uniform(0.55, 0.75)), float(rng.uniform(0.65, 0.95)), -TABLE_THICKNESS_M, -TABLE_HEIGHT_M
+    top = _surface(rng, 2 * x, 2 * y)
     floor, wall_colour = _surface(rng, 2 * ROOM_HALF_M, 2 * ROOM_HALF_M), pick(rng, LIGHTS) if rng.uniform() < 0.6 else pale(rng)
-    x, y, z, low = half[0], half[1], -TABLE_THICKNESS_M, -TABLE_HEIGHT_M
     edge = np.broadcast_to(top.reshape(-1, 3).mean(axis=0) * 0.85, (TEXELS, TEXELS, 3)).astype(np.float32)
     quads = [_quad((-x, -y, 0), (2 * x, 0, 0), (0, 2 * y, 0), top)]
     for corner, across in (
@@ -105,7 +102,7 @@ def make_room(rng: Generator) -> Room:
     lights = tuple(_light(rng, tint, share) for share in (1.0, float(rng.uniform(0.25, 0.6))))
     sky = np.array([0.97, 1.0, 1.05]) * float(rng.uniform(0.42, 0.6))
     mean = (top.reshape(-1, 3).mean(axis=0) ** 2.2 + floor.reshape(-1, 3).mean(axis=0) ** 2.2) / 2
-    return Room(tuple(quads), lights, sky, 0.15 * sky + 0.5 * mean * sky, half)
+    return Room(tuple(quads), lights, sky, 0.15 * sky + 0.5 * mean * sky)
 
 
 def _quad(
