@@ -14,11 +14,11 @@ from starlette.exceptions import HTTPException
 from starlette.formparsers import MultiPartException, MultiPartParser
 
 from core.errors import InvalidInput
-from core.views import Burst
 from service.agent import Agent
 from service.auth import LONGEST_ACTOR, Caller
 from service.console.demo import Demo
 from service.decoding import BurstLimits, Parts, Upload, decode_parts
+from service.goals import Source
 from service.limits import media_type
 from service.metrics import Metrics
 from service.npz import decode_npz
@@ -111,33 +111,32 @@ async def read_upload(request: Request) -> Decode:
 
 
 @dataclass(frozen=True)
-class Source:
+class Sent:
     """What a request is about."""
 
-    burst_or_id: Burst | str
-    """A burst, or the id of an observation."""
+    source: Source
     frame: str | None
     """Of the burst."""
 
 
-def read_source(model: type[BaseModel]) -> Callable[[Request], Coroutine[Any, Any, Callable[[], Source]]]:
+def read_sent(model: type[BaseModel]) -> Callable[[Request], Coroutine[Any, Any, Callable[[], Sent]]]:
     """A dependency: a burst in either form, to be decoded where work is done, or JSON of `model`, which names an observation."""
 
-    async def source(request: Request) -> Callable[[], Source]:
+    async def sent(request: Request) -> Callable[[], Sent]:
         if media_type(request.headers) != "application/json":
             decode = await read_upload(request)
-            return lambda: _source(decode())
+            return lambda: _sent(decode())
         try:
             named: Any = model.model_validate_json(await request.body())
         except ValidationError as error:
             raise RequestValidationError(error.errors()) from None
-        return lambda: Source(named.observation_id, None)
+        return lambda: Sent(named.observation_id, None)
 
-    return source
+    return sent
 
 
-def _source(upload: Upload) -> Source:
-    return Source(upload.burst, upload.frame)
+def _sent(upload: Upload) -> Sent:
+    return Sent(upload.burst, upload.frame)
 
 
 async def _read_parts(request: Request, settings: Settings) -> Parts:

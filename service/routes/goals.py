@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Query
 
-from service.deps import AgentDep, Source, WorkDep, read_source
+from service.deps import AgentDep, Sent, WorkDep, read_sent
 from service.exchange import MemoryRoute
 from service.routes.answers import by_id, goal
 from service.schemas.bursts import burst_or
@@ -16,9 +16,7 @@ from service.schemas.problem import problems
 
 router = APIRouter(tags=["goals"], route_class=MemoryRoute)
 BODY: dict[str, Any] = burst_or("Seen")
-
-
-SourceDep = Annotated[Callable[[], Source], Depends(read_source(Seen))]
+SentDep = Annotated[Callable[[], Sent], Depends(read_sent(Seen))]
 
 
 @router.post(
@@ -27,12 +25,12 @@ SourceDep = Annotated[Callable[[], Source], Depends(read_source(Seen))]
     responses=problems(404, 409, 413, 415, 422, 503),
     openapi_extra={"requestBody": BODY},
 )
-async def create_goal(category_id: str, source: SourceDep, query: Annotated[GoalQuery, Query()], agent: AgentDep, work: WorkDep) -> Goal:
+async def create_goal(category_id: str, read: SentDep, query: Annotated[GoalQuery, Query()], agent: AgentDep, work: WorkDep) -> Goal:
     """Keeps how an object of the category stands now, in a burst or in an earlier observation, as where others shall end."""
 
     def show() -> Goal:
-        sent = source()
-        shown = agent.rearranging.show(category_id, sent.burst_or_id, name=query.name, anchor=query.anchor, frame=sent.frame)
+        sent = read()
+        shown = agent.rearranging.show(category_id, sent.source, name=query.name, anchor=query.anchor, frame=sent.frame)
         return Goal.of(shown)
 
     return await work.run(show)
@@ -57,13 +55,13 @@ def delete_goal(goal_id: str, agent: AgentDep) -> None:
 
 
 @router.post("/v1/goals/{goal_id}/plan", responses=problems(404, 409, 413, 415, 422, 503), openapi_extra={"requestBody": BODY})
-async def plan(goal_id: str, source: SourceDep, query: Annotated[PlanQuery, Query()], agent: AgentDep, work: WorkDep) -> Plan:
+async def plan(goal_id: str, read: SentDep, query: Annotated[PlanQuery, Query()], agent: AgentDep, work: WorkDep) -> Plan:
     """The rigid motion that takes the object of a burst, or of an earlier observation, to the goal; both in one world frame."""
     up = query.options_up()
 
     def planned() -> Plan:
-        sent = source()
-        return Plan.of(agent.rearranging.plan(goal_id, sent.burst_or_id, anchor=query.anchor, up=up, frame=sent.frame))
+        sent = read()
+        return Plan.of(agent.rearranging.plan(goal_id, sent.source, anchor=query.anchor, up=up, frame=sent.frame))
 
     return await work.run(planned)
 

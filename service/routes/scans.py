@@ -7,7 +7,7 @@ from typing import Annotated
 
 from fastapi import APIRouter, Depends, Query
 
-from service.deps import ActorDep, AgentDep, Source, UploadDep, WorkDep, read_source
+from service.deps import ActorDep, AgentDep, Sent, UploadDep, WorkDep, read_sent
 from service.exchange import MemoryRoute
 from service.routes.answers import by_id, category, scan, scan_answer
 from service.schemas.bursts import BURST_BODY, burst_or
@@ -20,14 +20,14 @@ router = APIRouter(prefix="/v1/scans", tags=["scans"], route_class=MemoryRoute)
 
 @router.post("", status_code=201, responses=problems(404, 413, 415, 422, 503), openapi_extra={"requestBody": burst_or("ScanBegin")})
 async def begin_scan(
-    source: Annotated[Callable[[], Source], Depends(read_source(ScanBegin))],
+    read: Annotated[Callable[[], Sent], Depends(read_sent(ScanBegin))],
     query: Annotated[ScanQuery, Query()],
     agent: AgentDep,
     work: WorkDep,
 ) -> Scan:
     """Viewpoints to look from at the object of a burst, or of an earlier observation: a scan whatever was decided then."""
     options = query.options(agent.config.scan_views)
-    return await work.run(lambda: scan_answer(agent, agent.scanning.begin(source().burst_or_id, options)))
+    return await work.run(lambda: scan_answer(agent, agent.scanning.begin(read().source, options)))
 
 
 @router.get("", responses=problems(422))

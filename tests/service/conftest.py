@@ -22,6 +22,7 @@ from core.backbones.base import Backbone, Features
 from core.views import Burst
 from service.app import create_app
 from service.settings import Settings
+from store.keys import ROLES, Keys
 
 LONG_S = 60.0
 
@@ -118,6 +119,11 @@ def npz() -> Callable[..., bytes]:
 def small_service(folder: Path) -> Settings:
     """Settings of one whose memory is there."""
     return Settings(data_dir=folder, max_views=12, max_upload_mb=8, variant="ucd", score="pooled_best_view")
+
+
+def with_keys(keys: Keys) -> dict[str, dict[str, str]]:
+    """A new key of each role: by role the header that it travels in."""
+    return {role: {"Authorization": f"Bearer {keys.create(role, role)[1]}"} for role in ROLES}
 
 
 @pytest.fixture

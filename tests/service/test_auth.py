@@ -24,6 +24,7 @@ from service.rate import RateLimit
 from service.settings import Settings
 from store.keys import ROLES
 from store.memory import Memory
+from tests.service.conftest import with_keys
 
 DOCUMENT = create_app(Settings()).openapi()
 OPERATIONS = [
@@ -42,7 +43,7 @@ def guarded(tmp_path_factory: Any, colour_backbone: Any) -> Any:
     """(client, header by role) of a service that has a key of each role."""
     folder = tmp_path_factory.mktemp("guarded") / "memory"
     with Memory.keyring(folder) as keys:
-        headers = {role: {"Authorization": f"Bearer {keys.create(role, role)[1]}"} for role in ROLES}
+        headers = with_keys(keys)
     settings = Settings(data_dir=folder, variant="ucd", rate_limit=100_000)
     with TestClient(create_app(settings, backbone=colour_backbone)) as client:
         yield client, headers

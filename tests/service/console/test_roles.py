@@ -11,6 +11,7 @@ from service.console.install import ROUTERS
 from service.settings import Settings
 from store.keys import ROLES
 from store.memory import Memory
+from tests.service.conftest import with_keys
 
 OPEN = {"/sign-in", "/sign-out"}
 FORMS = ("/merge", "/delete")
@@ -27,7 +28,7 @@ def guarded(tmp_path_factory, colour_backbone):
     """(client, header by role) of a service that has a key of each role."""
     folder = tmp_path_factory.mktemp("roles") / "memory"
     with Memory.keyring(folder) as keys:
-        headers = {role: {"Authorization": f"Bearer {keys.create(role, role)[1]}"} for role in ROLES}
+        headers = with_keys(keys)
     with TestClient(create_app(Settings(data_dir=folder), backbone=colour_backbone), follow_redirects=False) as client:
         yield client, headers
 

@@ -14,6 +14,7 @@ from core.errors import Conflict
 from service.app import create_app
 from service.console import demo
 from service.console.demo import Demo
+from tests.service.conftest import with_keys
 
 
 @pytest.fixture
@@ -111,8 +112,7 @@ def test_where_keys_are_set_the_robot_has_one(client, begun, episode):
 
 
 def test_only_an_admin_begins_one_and_only_a_robot_asks(client, begun):
-    keys = client.app.state.running.agent.memory.keys
-    sent = {role: {"Authorization": f"Bearer {keys.create(role, role)[1]}"} for role in ("viewer", "robot", "admin")}
+    sent = with_keys(client.app.state.running.agent.memory.keys)
     for role, shown in (("viewer", False), ("robot", True)):
         assert client.post("/try/demo", headers=sent[role]).status_code == 403
         assert ("Ask what it is" in client.get("/try", headers=sent[role]).text) is shown
