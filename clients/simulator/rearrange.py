@@ -27,7 +27,7 @@ from clients.simulator.raycast.world import CENTER_M, RaycastWorld, standing
 from clients.simulator.scanning import COULD_NOT, learn_from_scan
 from core.camera_poses import look_at
 from core.sim3 import Sim3, rotation_angle_deg
-from core.views import FloatArray
+from core.views import Burst, FloatArray
 
 GOAL_M = (0.0, 0.12)
 """Goals are this far from the table's middle along y, and objects start on the other side of it."""
@@ -40,26 +40,39 @@ TILE = (180, 240)
 PICTURED = 6
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Trial:
     """One object brought to its category's goal, or why it was not."""
 
     number: int
-    name: str
+    name: str = ""
     category: str
-    reference: str
-    recognised: bool
-    rotation_deg: float | None
+    reference: str = ""
+    """Both names are empty where the reference could not be shown at the goal."""
+    recognised: bool = False
+    rotation_deg: float | None = None
     """Between how the object stands in the end and how the reference stood at the goal, modulo its symmetries."""
-    position_m: float | None
+    position_m: float | None = None
     """Between the middles of their bases."""
-    start_rotation_deg: float | None
-    start_position_m: float | None
+    start_rotation_deg: float | None = None
+    start_position_m: float | None = None
     """Before; None where the reference could not be shown at the goal."""
     failure: str | None
-    motion_s: float
+    motion_s: float = 0.0
     """Simulated."""
     seconds: float
+
+
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """A reference that was shown at its category's goal."""
+
+    goal_id: str
+    category_id: str
+    pose: Sim3
+    """In the world."""
+    reference: Model
+    picture: FloatArray
 
 
 @dataclass(frozen=True)
@@ -103,11 +116,9 @@ class Rearrangement:
         self._views = views
         self._seed = seed
         self._sensor = sensor
-        self._goals: dict[str, tuple[str, str, Sim3, Model]] = {}
-        self._names: dict[str, str] = {}
+        self._shown: dict[str, Shown] = {}
         self.pictures: list[FloatArray] = []
         """A row for each of the first trials: reference at the goal, the object before, the object brought there; BGR."""
-        self._goal_pictures: dict[str, FloatArray] = {}
 
     def __iter__(self) -> Iterator[Trial]:
         for number in range(self._done + 1, self._trials + 1):
@@ -120,55 +131,29 @@ class Rearrangement:
     def _trial(self, number: int, category: str) -> Trial:
         started = time.perf_counter()
         try:
-            if category not in self._goals:
-                self._show_goal(category)
+            if category not in self._shown:
+                self._shown[category] = self._show_goal(category)
         except COULD_NOT as problem:
-            return Trial(
-                number=number,
-                name="",
-                category=category,
-                reference="",
-                recognised=False,
-                rotation_deg=None,
-                position_m=None,
-                start_rotation_deg=None,
-                start_position_m=None,
-                failure=f"no goal: {problem}",
-                motion_s=0.0,
-                seconds=time.perf_counter() - started,
-            )
-        goal_id, category_id, goal, reference = self._goals[category]
+            return Trial(number=number, category=category, failure=f"no goal: {problem}", seconds=time.perf_counter() - started)
+        shown = self._shown[category]
         model = RECIPES[category].make(category, self._seed * 1000 + number)
         world = self._world(number)
         place = np.random.default_rng([self._seed, number])
         start = standing(model, rotation_about("z", float(place.uniform(0, 360))), (float(place.uniform(-0.04, 0.04)), -GOAL_M[1]))
         world.show([model], [start])
         arm = Arm(world, ArmConfig())
-        before = _error(model, start, reference, goal)
+        before = _error(model, start, shown)
         burst = arm.glance(self._views, number)
-        after, failure, recognised = None, None, False
         picture = self._picture(world)
-        try:
-            seen, _, _ = observe_until_sure(self._robot, arm, burst, learn=False)
-            recognised = seen.outcome == "known" and seen.category_id == category_id
-            if recognised:
-                plan = self._robot.plan(goal_id, seen.id, anchor="base", up=(0.0, 0.0, 1.0))
-                arm.carry(plan.distance_m, plan.angle_deg)
-                world.move(0, plan.goal_from_current)
-                (ended,) = world.objects
-                assert ended.world_from_model is not None
-                after = _error(model, ended.world_from_model, reference, goal)
-            else:
-                failure = f"was taken for {self._names.get(seen.category_id or '', 'something else') if seen.category_id else seen.outcome}"
-        except ServiceProblem as problem:
-            failure = str(problem)
+        recognised, ended, failure = self._bring(world, arm, burst, shown)
+        after = None if ended is None else _error(model, ended, shown)
         if after is not None and number <= PICTURED:
-            self.pictures.append(np.hstack([self._goal_pictures[category], picture, self._picture(world)]))
+            self.pictures.append(np.hstack([shown.picture, picture, self._picture(world)]))
         return Trial(
             number=number,
             name=model.name,
             category=category,
-            reference=reference.name,
+            reference=shown.reference.name,
             recognised=recognised,
             rotation_deg=after[0] if after else None,
             position_m=after[1] if after else None,
@@ -179,7 +164,26 @@ class Rearrangement:
             seconds=time.perf_counter() - started,
         )
 
-    def _show_goal(self, category: str) -> None:
+    def _bring(self, world: RaycastWorld, arm: Arm, burst: Burst, shown: Shown) -> tuple[bool, Sim3 | None, str | None]:
+        """Whether the object was recognised, how it stands once it was brought to the goal, and why it was not brought there."""
+        recognised = False
+        try:
+            seen, _, _ = observe_until_sure(self._robot, arm, burst, learn=False)
+            recognised = seen.outcome == "known" and seen.category_id == shown.category_id
+            if not recognised:
+                return False, None, f"was taken for {self._called(seen.category_id) if seen.category_id else seen.outcome}"
+            plan = self._robot.plan(shown.goal_id, seen.id, anchor="base", up=(0.0, 0.0, 1.0))
+        except ServiceProblem as problem:
+            return recognised, None, str(problem)
+        arm.carry(plan.distance_m, plan.angle_deg)
+        world.move(0, plan.goal_from_current)
+        (ended,) = world.objects
+        return True, ended.world_from_model, None
+
+    def _called(self, category_id: str) -> str:
+        return next((category for category, shown in self._shown.items() if shown.category_id == category_id), "something else")
+
+    def _show_goal(self, category: str) -> Shown:
         """Learns the category from its reference, then shows the reference at the goal, unless an interrupted run did.
 
         Raises ServiceProblem, ScanFailed.
@@ -193,16 +197,14 @@ class Rearrangement:
             arm = Arm(world, ArmConfig())
             known = learn_from_scan(self._robot, arm, self._views, visit, category).id
         place = np.random.default_rng([self._seed, visit])
-        goal = standing(reference, rotation_about("z", float(place.uniform(0, 360))), GOAL_M)
+        pose = standing(reference, rotation_about("z", float(place.uniform(0, 360))), GOAL_M)
         world = self._world(visit)
-        world.show([reference], [goal])
+        world.show([reference], [pose])
         goals = self._robot.goals(known)
         if not goals:
-            shown = self._robot.observe(Arm(world, ArmConfig()).glance(self._views, visit + 1), category_id=known, learn=False)
-            goals = [self._robot.set_goal(known, shown.id, name="goal", anchor="base")]
-        self._goals[category] = (goals[0].id, known, goal, reference)
-        self._names[known] = category
-        self._goal_pictures[category] = self._picture(world)
+            seen = self._robot.observe(Arm(world, ArmConfig()).glance(self._views, visit + 1), category_id=known, learn=False)
+            goals = [self._robot.set_goal(known, seen.id, name="goal", anchor="base")]
+        return Shown(goals[0].id, known, pose, reference, self._picture(world))
 
     def _world(self, visit: int) -> RaycastWorld:
         return RaycastWorld(self._seed, self._sensor, visit=visit)
@@ -250,12 +252,12 @@ def write_json(trials: Sequence[Trial], summary: RearrangeSummary, settings: dic
     file.write_text(json.dumps(content, indent=1), encoding="utf-8")
 
 
-def _error(model: Model, pose: Sim3, reference: Model, goal: Sim3) -> tuple[float, float]:
+def _error(model: Model, pose: Sim3, shown: Shown) -> tuple[float, float]:
     """(degrees, metres) between an object's pose and the reference's at the goal."""
     allowed = np.stack([np.eye(3), *model.symmetries])
-    turned = goal.rotation.T @ pose.rotation
+    turned = shown.pose.rotation.T @ pose.rotation
     degrees = float(rotation_angle_deg(allowed, turned[None]).min())
-    return degrees, float(np.linalg.norm(_base(model, pose) - _base(reference, goal)))
+    return degrees, float(np.linalg.norm(_base(model, pose) - _base(shown.reference, shown.pose)))
 
 
 def _base(model: Model, pose: Sim3) -> FloatArray:
