@@ -68,5 +68,6 @@ def write_image(path: Path, image: NDArray[Any], options: Sequence[int] = ()) ->
 def _read(path: Path, flags: int) -> Any:
     image = cv2.imread(str(path), flags)
     if image is None:
-        raise InvalidInput(str(path), "is not a readable image")
+        found = "is no file" if not path.is_file() else "is empty" if not path.stat().st_size else "cannot be decoded"
+        raise InvalidInput(str(path), f"{found}; expected an image ({', '.join(sorted(SUFFIXES))})")
     return image

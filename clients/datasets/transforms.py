@@ -76,7 +76,7 @@ def _image(folder: Path, name: str, field: str) -> Path:
     candidates = [path, *(path.with_name(path.name + suffix) for suffix in sorted(SUFFIXES))]
     found = next((each for each in candidates if each.is_file()), None)
     if found is None:
-        raise InvalidInput(field, f"{path} is no file")
+        raise InvalidInput(field, f"{path} is no file; expected an image below {folder}, with or without its suffix")
     return found
 
 

@@ -40,7 +40,8 @@ def commands(command: Any, name: str = "onelook") -> Iterator[str]:
 
 COMMANDS = sorted(commands(get_command(app)))
 SETTINGS = {f"ONELOOK_{name.upper()}" for name in Settings.model_fields}
-ENDPOINTS = sorted((method.upper(), path) for path, methods in create_app(Settings()).openapi()["paths"].items() for method in methods)
+PATHS = create_app(Settings()).openapi()["paths"]
+ENDPOINTS = sorted((method.upper(), path) for path, methods in PATHS.items() for method in methods)
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -92,6 +93,12 @@ def method_of(call: str) -> str:
 def test_every_kind_of_error_is_documented(status: int, kind: str) -> None:
     (row,) = re.findall(rf"^\| {status} \|(.*)\|$", HTTP.partition("\n## Errors\n")[2], re.MULTILINE)
     assert f"`{kind}`" in row
+
+
+@pytest.mark.parametrize(("method", "path"), ENDPOINTS)
+def test_every_query_option_is_documented(method: str, path: str) -> None:
+    options = [each["name"] for each in PATHS[path][method.lower()].get("parameters", []) if each["in"] == "query"]
+    assert [each for each in options if not re.search(rf"`[^`]*\b{each}\b[^`]*`|[?&]{each}=", HTTP)] == []
 
 
 def test_documented_endpoints_exist() -> None:

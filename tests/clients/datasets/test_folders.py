@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from clients.datasets.folders import Sequence, find_sequences, load_burst
+from clients.datasets.images import read_rgb
 from core.errors import InvalidInput
 
 
@@ -112,6 +113,15 @@ def test_what_is_wrong_with_a_recording_is_named(
     with pytest.raises(InvalidInput, match=says) as caught:
         load_burst(find_sequences(folder)[0])
     assert caught.value.field == str(folder / field) if field else str(folder)
+
+
+@pytest.mark.parametrize(("content", "says"), [(None, "is no file"), (b"", "is empty"), (b"text", "cannot be decoded")])
+def test_an_image_that_cannot_be_read_is_named(tmp_path: Path, content: bytes | None, says: str) -> None:
+    path = tmp_path / "000000.jpg"
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(InvalidInput, match=f"{says}; expected an image"):
+        read_rgb(path)
 
 
 def test_images_without_cameras_may_have_any_name(recordings: list[Sequence], tmp_path: Path) -> None:
