@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from clients.datasets.folders import Sequence, find_sequences, load_burst
-from core.backbones import load_backbone
 from core.backbones.base import Backbone
 from core.encode import EncodedBurst, Encoder, EncoderConfig
 from core.errors import InvalidInput, NoObject
@@ -18,17 +17,15 @@ from core.reference import build_reference
 from core.sim3 import Sim3, rotation_angle_deg
 from core.views import Burst, Camera, View
 
-SAMPLES = Path(__file__).parents[1] / "data" / "bursts"
+
+@pytest.fixture(scope="module")
+def backbone(embedded_backbone: Backbone) -> Backbone:
+    return embedded_backbone
 
 
 @pytest.fixture(scope="module")
-def backbone() -> Backbone:
-    return load_backbone()
-
-
-@pytest.fixture(scope="module")
-def sequence() -> Sequence:
-    return find_sequences(SAMPLES)[0]
+def sequence(samples: Path) -> Sequence:
+    return find_sequences(samples)[0]
 
 
 @pytest.fixture(scope="module")

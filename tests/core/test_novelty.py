@@ -1,4 +1,4 @@
-"""Known or novel by the paper's rule."""
+"""Known, uncertain or novel: by the paper's rule, and by ours."""
 
 from __future__ import annotations
 

@@ -14,8 +14,6 @@ from clients.datasets.folders import find_sequences, load_burst
 from core.quality import Region, faults, region_of_sphere, sharpness
 from core.views import Camera, View
 
-CENTRED = Region(80, 80, 70)
-
 
 @pytest.fixture(scope="module")
 def recorded(samples: Path) -> View:

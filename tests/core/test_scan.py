@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -32,6 +34,15 @@ def test_a_scan_is_requested_about_the_object(moved: Sim3, painted: PaintedObjec
     assert request.world_from_camera.shape == (12, 4, 4)
     assert np.linalg.norm(request.center_m - moved.translation) < 0.1
     assert request.up_from == "cameras"
+
+
+def test_a_scan_is_asked_for_about_the_object_though_some_patches_are_of_the_wall(painted: PaintedObject) -> None:
+    encoded = painted.encode(8)
+    first = encoded.views[0]
+    strays = first.points_m.copy()
+    strays[: len(strays) // 3] += (0.0, 0.0, 4.0)
+    strayed = replace(encoded, views=(replace(first, points_m=strays), *encoded.views[1:]))
+    assert request_scan(strayed).radius_m == pytest.approx(request_scan(encoded).radius_m, rel=0.1)
 
 
 def test_the_object_fills_its_share_of_the_image(moved: Sim3, painted: PaintedObject) -> None:

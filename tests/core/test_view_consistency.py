@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
 from core.encode import EncodedBurst, EncodedView
 from core.reference import build_reference
-from core.scan import request_scan
 from core.sim3 import Sim3
 from core.view_consistency import consistent_only
 
@@ -60,15 +58,6 @@ def test_of_two_views_that_differ_both_stay(painted: PaintedObject) -> None:
 def test_views_without_depth_say_nothing(painted: PaintedObject) -> None:
     photographed = blind(painted.encode(6))
     assert consistent_only(photographed) is photographed
-
-
-def test_a_scan_is_asked_for_about_the_object_though_some_patches_are_of_the_wall(painted: PaintedObject) -> None:
-    encoded = painted.encode(8)
-    first = encoded.views[0]
-    strays = first.points_m.copy()
-    strays[: len(strays) // 3] += (0.0, 0.0, 4.0)
-    strayed = replace(encoded, views=(replace(first, points_m=strays), *encoded.views[1:]))
-    assert request_scan(strayed).radius_m == pytest.approx(request_scan(encoded).radius_m, rel=0.1)
 
 
 def test_what_is_before_the_object_in_one_view_goes(painted: PaintedObject) -> None:
