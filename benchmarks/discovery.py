@@ -2,13 +2,15 @@
 
 Works on images alone; where there is depth and cameras, `best` also verifies by pose. See `benchmarks.episodes` for what counts as an
 error and `benchmarks.calibrated` for the threshold that comes from a rate.
+
+Letters: N bursts, T thresholds or rates.
 """
 
 from __future__ import annotations
 
 import operator
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
 from pathlib import Path
@@ -79,8 +81,23 @@ class Job:
 
     pairs: PairScores | BestPairs
     labels: NDArray[np.intp]
+    """The true category of each burst, shape (N,)."""
     orders: list[list[int]]
+    """The bursts of each episode."""
     thresholds: FloatArray
+    """Or rates, shape (T,)."""
+
+
+@dataclass(frozen=True)
+class Found:
+    """What the episodes came to."""
+
+    rows: list[Row]
+    """Of `score_rows`."""
+    rates: list[Row]
+    """Of `rate_rows`; none without `best`."""
+    hardest: int | None
+    """The burst that EASIER goes without; None without `best`."""
 
 
 def run(
@@ -111,16 +128,8 @@ def run(
         raise InvalidInput("data", "discovery needs two categories, and two objects of one of them")
     network = load_backbone(backbone)
     tables = _all_tables(encode_all(sequences, Encoder(network)), network.whitening, scores, poses)
-    orders = draw_orders(episodes, labels, length, seed)
     started = time.perf_counter()
-    rows = [row for name, table in tables.items() for row in score_rows(name, table, labels, orders)]
-    first, rates, left_out = tables.get(BEST), list[Row](), None
-    if isinstance(first, BestPairs):
-        left_out = hardest(first.single(), labels)
-        fewer = np.delete(labels, left_out)
-        easier, fewer_orders = first.without(left_out), draw_orders(episodes, fewer, length, seed)
-        rows += score_rows(EASIER, easier, fewer, fewer_orders)
-        rates = rate_rows(BEST, first, labels, orders) + rate_rows(EASIER, easier, fewer, fewer_orders)
+    found = measure(tables, labels, lambda labels: draw_orders(episodes, labels, length, seed))
     meta = {
         "benchmark": "discovery",
         "data": data,
@@ -131,17 +140,34 @@ def run(
         "categories": len(objects),
         "backbone": network.name,
         "fingerprint": network.fingerprint,
-        "hardest": None if left_out is None else sequences[left_out].name,
+        "hardest": None if found.hardest is None else sequences[found.hardest].name,
         "episode_seconds": time.perf_counter() - started,
     }
     if json is not None:
-        write_json(json, meta, rows + rates)
+        write_json(json, meta, found.rows + found.rates)
     if picture is not None:
-        plot(picture, rows, f"{data.name}: {episodes} episodes of {length} of {len(sequences)} bursts")
-    print_table(f"Discovery, {data}: {episodes} episodes of {length}", [row for row in rows if "auroc" in row], SUMMARY)
-    if rates:
-        print_table("Threshold from a false-known rate", rates, RATE_COLUMNS)
-    return rows + rates
+        plot(picture, found.rows, f"{data.name}: {episodes} episodes of {length} of {len(sequences)} bursts")
+    print_table(f"Discovery, {data}: {episodes} episodes of {length}", [row for row in found.rows if "auroc" in row], SUMMARY)
+    if found.rates:
+        print_table("Threshold from a false-known rate", found.rates, RATE_COLUMNS)
+    return found.rows + found.rates
+
+
+def measure(
+    tables: Mapping[str, PairScores | BestPairs], labels: NDArray[np.intp], draw: Callable[[NDArray[np.intp]], list[list[int]]]
+) -> Found:
+    """Episodes of every score, and of `best` also without the hardest burst; `draw` gives the orders for labels, shape (N,)."""
+    orders = draw(labels)
+    rows = [row for name, table in tables.items() for row in score_rows(name, table, labels, orders)]
+    best = tables.get(BEST)
+    if not isinstance(best, BestPairs):
+        return Found(rows, [], None)
+    left_out = hardest(best.single(), labels)
+    fewer, easier = np.delete(labels, left_out), best.without(left_out)
+    fewer_orders = draw(fewer)
+    rows += score_rows(EASIER, easier, fewer, fewer_orders)
+    rates = rate_rows(BEST, best, labels, orders) + rate_rows(EASIER, easier, fewer, fewer_orders)
+    return Found(rows, rates, left_out)
 
 
 def _all_tables(
@@ -168,7 +194,7 @@ def has_poses(pairs: BestPairs) -> bool:
 
 
 def score_rows(name: str, pairs: PairScores | BestPairs, labels: NDArray[np.intp], orders: list[list[int]]) -> list[Row]:
-    """A row for each threshold, ascending, then the summary row."""
+    """A row for each threshold, ascending, then the summary row; labels and orders as of `Job`."""
     single, own = pairs.single(), default_threshold(name, pairs)
     thresholds = threshold_grid(name, pairs, single, own)
     counts = sum_jobs(run_episodes, pairs, labels, orders, thresholds, name)
@@ -206,7 +232,7 @@ def score_rows(name: str, pairs: PairScores | BestPairs, labels: NDArray[np.intp
 
 
 def rate_rows(name: str, pairs: BestPairs, labels: NDArray[np.intp], orders: list[list[int]]) -> list[Row]:
-    """What was asked for and what came of it, a row for each rate; in percent."""
+    """What was asked for and what came of it, a row for each rate, in percent; labels and orders as of `Job`."""
     answers = sum_jobs(run_calibrated, pairs, labels, orders, np.array(calibrated.RATES), f"{name}, calibrated")
 
     def percent(part: str, *whole: str) -> FloatArray:
@@ -236,7 +262,7 @@ def sum_jobs(
     thresholds: FloatArray,
     name: str,
 ) -> Total:
-    """What `function` counts over all orders, in parallel."""
+    """What `function` counts over all orders, in parallel; labels and thresholds as of `Job`."""
     chunks = [orders[start : start + JOB_EPISODES] for start in range(0, len(orders), JOB_EPISODES)]
     return total(map_jobs(function, [Job(pairs, labels, chunk, thresholds) for chunk in chunks], lambda job: len(job.orders), name))
 

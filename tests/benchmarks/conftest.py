@@ -41,6 +41,15 @@ def recorded(tmp_path: Path, ellipsoid: Any) -> Path:
     return tmp_path / "data"
 
 
+@pytest.fixture
+def two_kinds(recorded: Path, ellipsoid: Any) -> Path:
+    """Two eggs, and two flat things of other colours."""
+    flat = ellipsoid(np.array([0.5, 0.5, 0.15]) / np.linalg.norm([1.0, 1.0, 0.3]), colour=(120, -90))
+    for name, scale in (("a", 0.4), ("b", 0.5)):
+        record(recorded / "plate" / name, flat, Sim3(scale, np.eye(3), np.array([0.1, 0.2, 0.3])))
+    return recorded
+
+
 def record(folder: Path, ellipsoid: Any, world_from_model: Sim3, views: int = 4) -> None:
     """Writes views of an ellipsoid with exact depth, masks and ground truth."""
     cameras, truth = {}, {}

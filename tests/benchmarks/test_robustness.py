@@ -7,9 +7,7 @@ import pickle
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
 
-import numpy as np
 import pytest
 
 from benchmarks import clean_memory, robustness
@@ -18,9 +16,6 @@ from benchmarks.degradations.catalogue import catalogue
 from benchmarks.robustness import CLEAN, Outcome, breaks_at, figures, table_rows
 from clients.pose_error import NO_POSE, PoseError
 from core.errors import InvalidInput, NoObject
-from core.sim3 import Sim3
-
-from .conftest import record
 
 KNOWN = Decisions(own=2.0, rival=1.0, right=True, nearest=True, uncertain=False, novel=False, false_known=False)
 MISSED = Decisions(own=0.0, rival=1.0, right=False, nearest=False, uncertain=False, novel=True, false_known=True)
@@ -31,15 +26,6 @@ run = partial(robustness.run, views="3", limit=None, degradations=[], categories
 def small(small_world, monkeypatch: pytest.MonkeyPatch, backbone) -> None:
     small_world(robustness)
     monkeypatch.setattr(robustness, "backbone_named", lambda name: backbone)
-
-
-@pytest.fixture
-def two_kinds(recorded: Path, ellipsoid: Any) -> Path:
-    """Two eggs, and two flat things of other colours."""
-    flat = ellipsoid(np.array([0.5, 0.5, 0.15]) / np.linalg.norm([1.0, 1.0, 0.3]), colour=(120, -90))
-    for name, scale in (("a", 0.4), ("b", 0.5)):
-        record(recorded / "plate" / name, flat, Sim3(scale, np.eye(3), np.array([0.1, 0.2, 0.3])))
-    return recorded
 
 
 def only(monkeypatch: pytest.MonkeyPatch, **strengths: tuple[float, ...]) -> list[str]:
