@@ -4,7 +4,7 @@ A known burst joins only above the stricter level; an uncertain one changes noth
 they are what it is tested on: the share of them that were called known. The first burst of an episode meets an empty memory and is
 not counted.
 
-Letters: E episodes, T rates, L bursts an episode presents, N bursts.
+Letters: E episodes, T rates, N bursts.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class Answers:
 
 
 def episode(pairs: BestPairs, labels: NDArray[np.intp], order: Sequence[int], rates: Sequence[float] = RATES) -> Answers:
-    """One episode over the bursts at `order`, for every rate side by side."""
+    """One episode over the bursts at `order`, for every rate side by side, given the true category of every burst, shape (N,)."""
     rows, used = np.arange(len(rates)), np.zeros(len(rates), dtype=np.intp)
     kind = pairs.prior.of(pairs.agreement is not None)
     rivals: list[list[float]] = [[] for _ in rates]

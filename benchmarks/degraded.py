@@ -1,7 +1,4 @@
-"""Degraded bursts, encoded once and kept in the user's cache by what they show.
-
-Letters: V views, S side of a square image, in pixels.
-"""
+"""Degraded bursts, encoded once and kept in the user's cache by what they show."""
 
 from __future__ import annotations
 

@@ -5,7 +5,7 @@ threshold, else founds a new one. A false positive joined a category whose major
 negative founded one though its own had been seen. A repeat of a burst met before is learnt from but counted apart: it is
 trivially known.
 
-Letters: E episodes, T thresholds, L bursts an episode presents, C categories of the memory (room for them), K true categories, N bursts.
+Letters: E episodes, T thresholds, L bursts an episode presents, K true categories, N bursts.
 """
 
 from __future__ import annotations
@@ -169,7 +169,10 @@ def labels_of(sequences: Sequence[folders.Sequence]) -> NDArray[np.intp]:
 
 
 def draw_orders(count: int, labels: NDArray[Any], length: int, seed: int) -> list[list[int]]:
-    """`count` seeded episodes of `length` bursts, drawn with replacement from MOST_SEQUENCES of each of MOST_CATEGORIES categories."""
+    """`count` seeded episodes of `length` bursts, drawn with replacement from MOST_SEQUENCES of each of MOST_CATEGORIES categories.
+
+    `labels`: true category of every burst, shape (N,).
+    """
     rng = np.random.default_rng(seed)
     orders: list[list[int]] = []
     for _ in range(count):

@@ -89,7 +89,7 @@ def table(job: Job) -> FloatArray:
 
 
 def row(name: str, matches: FloatArray, cohort: int, labels: NDArray[np.intp]) -> Row:
-    """One line of the table."""
+    """One line of the table, from matches of all pairs, shape (N, N), and the category of each burst, shape (N,)."""
     single = single_evidence(matches, Prior.shipped(), cohort)
     return dict(zip(COLUMNS, (name, auroc(*same_and_other(single, labels)), nearest_accuracy(single, labels))))
 

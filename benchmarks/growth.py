@@ -26,6 +26,8 @@ from core.errors import InvalidInput
 
 ASKED = 1
 """Instance of a category that is looked at; the one that the memory holds is 0."""
+LEVELS = ("bursts", *(field.name for field in fields(Levels)))
+"""Columns of how well bursts match."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,9 +134,6 @@ def run(
     if plot is not None:
         plot_growth(plot, rows, f"{views} views a burst, one burst a category")
     return rows
-
-
-LEVELS = ("bursts", *(field.name for field in fields(Levels)))
 
 
 def synthetic_tokens(data: Path | None, backbone: str, seed: int) -> tuple[SyntheticTokens, Levels, Levels]:

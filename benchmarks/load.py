@@ -25,6 +25,8 @@ from core.views import Burst
 
 LEARNT = 3
 """Categories that the service knows before, so that most observations pass every stage."""
+TAUGHT_VIEWS = 8
+"""Of a category, at most."""
 WARM_UP_S = 2.0
 """Of one robot alone, not counted."""
 
@@ -126,7 +128,7 @@ def teach(url: str, sequences: Sequence[folders.Sequence]) -> None:
     firsts = [group[0] for group in folders.by_category(list(sequences)).values()][:LEARNT]
     with RobotClient(url) as robot:
         for sequence in firsts:
-            burst = folders.load_burst(sequence, range(min(8, len(sequence.images))))
+            burst = folders.load_burst(sequence, range(min(TAUGHT_VIEWS, len(sequence.images))))
             scan = robot.scan(burst)
             for view in burst.views:
                 scan.add(view)

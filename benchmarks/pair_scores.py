@@ -3,7 +3,7 @@
 A category is a set of bursts. What each of them has to do with a burst adds up, or the largest counts (`core.scores`); with that kept for
 every pair, thousands of episodes need no token again.
 
-Letters: N bursts; a leading * is any batch of sets.
+Letters: N bursts, P and Q pairs of them; a leading * is any batch of sets.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ class PairScores:
 
 
 def auroc(positive: FloatArray, negative: FloatArray) -> float:
-    """Probability that a positive exceeds a negative, ties counted half; NaN where one side is empty."""
+    """Probability that a positive, shape (P,), exceeds a negative, shape (Q,), ties counted half; NaN where one side is empty."""
     if not len(positive) or not len(negative):
         return float("nan")
     ranks = rankdata(np.concatenate([positive, negative]))[: len(positive)]
@@ -68,7 +68,10 @@ def auroc(positive: FloatArray, negative: FloatArray) -> float:
 
 
 def same_and_other(single: FloatArray, labels: NDArray[np.intp]) -> tuple[FloatArray, FloatArray]:
-    """Similarities of pairs of different bursts: of the same category, and of two categories."""
+    """Similarities of pairs of different bursts, of all in `single`, shape (N, N): of one category, shape (P,), and of two, shape (Q,).
+
+    `labels`, here and below: the category of each burst, shape (N,).
+    """
     same = labels[:, None] == labels[None, :]
     different_bursts = ~np.eye(len(labels), dtype=bool)
     return single[same & different_bursts], single[~same]

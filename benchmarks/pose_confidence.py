@@ -27,6 +27,7 @@ from core.errors import NoPose
 from core.pose import VARIANTS, PoseEstimator
 
 RIGHT_DEG = 30.0
+"""Rotation error up to which a pose counts as right."""
 BINS = 5
 """Of the plot, with as many poses each."""
 

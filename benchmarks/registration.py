@@ -26,6 +26,7 @@ global registration: 2 for normals, 5 for descriptors, 1.5 and 0.5 for correspon
 RANSAC_TRIALS = 100_000
 RANSAC_CONFIDENCE = 0.999
 MIN_EDGE_RATIO = 0.9
+"""Of an edge of a sample in both clouds, the shorter over the longer. This and RANSAC's trials and confidence are the tutorial's, too."""
 
 _registration = o3d.pipelines.registration
 

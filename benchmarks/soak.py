@@ -33,6 +33,7 @@ PART = 1 / 6
 SETTINGS = {"ONELOOK_KEEP_OBSERVATIONS": "50", "ONELOOK_UNDO_DAYS": "0"}
 """So that what is kept is bounded soon, as a service of years is."""
 SAMPLES_OF_A_RUN = 600
+"""Of memory and queue, evenly over the time."""
 
 
 @dataclass(frozen=True)

@@ -70,11 +70,13 @@ OBSERVATION = ("encode", f"decide {DEFAULT_SCORE}", f"solve {PoseConfig().varian
 STRAIGHTFORWARD = "encode, both passes whole, in single precision"
 BARE = "encode, the bare products of both passes, whole"
 NEAR = "encode, close crop near the object only"
-CONTEXT = 2
 PRODUCTS = "products of all patches"
 RECIPE = "solve as zero-shot-pose does"
-GROWING = ("ucd", "best")
-MORE = 3
+"""Operations that others are compared with."""
+CONTEXT = 2
+"""Patches around the object that NEAR sees as well."""
+GROWING, MORE = ("ucd", "best"), 3
+"""Variants that are timed with so many times the views as well."""
 
 
 def run(

@@ -26,6 +26,7 @@ from core.evidence import PATCHES, Adaptation, match_views, sample_patches, whit
 from core.views import FloatArray
 
 PARTS = 48
+"""Of a category; a view shows half of them."""
 NOISE = 0.3
 """Share of the variance of patches within a view that no other view shows again."""
 TRIED = 12

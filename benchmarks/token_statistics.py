@@ -20,6 +20,7 @@ from core.backbones.whitening import STATISTICS, Whitening
 from core.encode import Encoder
 
 PATCHES_A_VIEW = 200
+"""Drawn at random."""
 
 
 def main(

@@ -30,6 +30,7 @@ from core.errors import InvalidInput
 from core.views import View
 
 PATCH_PX = 14
+"""Side of a patch of the embedded backbone, with which the services run."""
 WARM_UP = 6
 """Frames that are answered one by one before the clock starts: the window fills, and kernels load."""
 LATE_S = 10.0
@@ -137,8 +138,8 @@ async def _follow(url: str, category_id: str, frames: Sequence[View], rate_hz: f
         messages = [(number, talk.frame(view, number / rate_hz)) for number, view in zip(times, turns)]
         listening = asyncio.create_task(_listen(socket, stream))
         await _send(socket, messages, rate_hz, stream)
-        with_end = time.monotonic() + LATE_S
-        while not stream.over and time.monotonic() < with_end:
+        end = time.monotonic() + LATE_S
+        while not stream.over and time.monotonic() < end:
             await asyncio.sleep(0.05)
         listening.cancel()
     return stream

@@ -12,8 +12,9 @@ from core.backbones.dino import passes
 
 BLOCKS = 12
 HEAD_DIM = 64
+"""Size of an attention head's tokens."""
 WIDENING = 4
-"""Of the two layers between attention and attention. These are the sizes of every ViT-S and ViT-B."""
+"""Of the two layers between attention and attention. All three are the sizes of every ViT-S and ViT-B."""
 
 
 @torch.inference_mode()

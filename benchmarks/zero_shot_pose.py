@@ -17,7 +17,9 @@ from core.matched_pair import MatchedPair
 from core.views import FloatArray
 
 CORRESPONDENCES = 50
+"""K."""
 TRIALS = 1000
+"""Of RANSAC, at most."""
 
 
 class Similarity(SimilarityTransform):
@@ -49,7 +51,7 @@ def solve(pair: MatchedPair, threshold_m: float, seed: int) -> FloatArray:
 
 
 def bare_products(reference: Sequence[FloatArray], target: Sequence[FloatArray]) -> FloatArray:
-    """Cosines of all patches of all view pairs in one product, and nothing else."""
+    """Cosines of all patches of all view pairs in one product, and nothing else; rows are the reference's patches, columns the target's."""
     sides = [torch.from_numpy(np.concatenate(vectors)) for vectors in (reference, target)]
     return np.asarray(sides[0] @ sides[1].T)
 

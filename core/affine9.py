@@ -18,9 +18,11 @@ from core.sim3 import Sim3, homogeneous
 from core.views import FloatArray
 
 MIN_CORRESPONDENCES = 4
+"""Fewer lie in one plane."""
 PLANE_TOLERANCE = 1e-6
 """Smallest variance of the points over their largest below which they count as lying in one plane."""
 ROUNDS = 200
+"""Of refinement, at most."""
 CONVERGED = 1e-10
 """Relative change of the scales in a round."""
 

@@ -12,11 +12,16 @@ from core.sim3 import homogeneous
 from core.views import FloatArray
 
 ELEVATION_RANGE_DEG = (15.0, 70.0)
+"""Of the ways from the centre to viewpoints, above the plane across `up`."""
 GOLDEN_ANGLE = np.pi * (3 - np.sqrt(5))
+"""Radians from one azimuth to the next, which leave no direction empty however many there are."""
 
 
 def hemisphere(center_m: FloatArray, up: FloatArray, radius_m: float, count: int) -> FloatArray:
-    """Evenly spread camera poses, shape (count, 4, 4), spiralling up between the elevations of ELEVATION_RANGE_DEG."""
+    """Evenly spread camera poses, shape (count, 4, 4), spiralling up between the elevations of ELEVATION_RANGE_DEG.
+
+    They look at `center_m`, shape (3,); `up` is a unit vector, shape (3,).
+    """
     low, high = np.sin(np.radians(ELEVATION_RANGE_DEG))
     heights = low + (high - low) * (np.arange(count) + 0.5) / count
     return _around(center_m, up, radius_m, heights, GOLDEN_ANGLE * np.arange(count))
@@ -65,7 +70,7 @@ def _around(center_m: FloatArray, up: FloatArray, radius_m: float, heights: Floa
 
 
 def look_at(position_m: FloatArray, aim_m: FloatArray, up: FloatArray) -> FloatArray:
-    """world_from_camera, shape (4, 4), of a camera without roll. Raises InvalidInput where it looks along `up`."""
+    """world_from_camera, shape (4, 4), of a camera without roll, from shapes (3,) each. Raises InvalidInput where it looks along `up`."""
     forward = aim_m - position_m
     right = np.cross(forward, up)
     if np.linalg.norm(right) < 1e-9 * max(float(np.linalg.norm(forward)), 1e-9):
@@ -76,7 +81,7 @@ def look_at(position_m: FloatArray, aim_m: FloatArray, up: FloatArray) -> FloatA
 
 
 def nearest_view(world_from_camera: FloatArray, candidates: FloatArray, center_m: FloatArray) -> tuple[int, float]:
-    """Which of the candidate poses, shape (n, 4, 4), sees the object most nearly from the side of a pose, and the angle off in degrees."""
+    """Which of the candidate poses, shape (n, 4, 4), sees the object most nearly from the side of a pose, shape (4, 4), and degrees off."""
     angles = angles_about_deg(world_from_camera[None, :3, 3], candidates[:, :3, 3], center_m)[0]
     best = int(angles.argmin())
     return best, float(angles[best])

@@ -71,7 +71,7 @@ class Confidence:
 
 
 def probabilities(scores: FloatArray, target_views: int, fingerprint: str) -> list[float | None]:
-    """Of hypotheses that differ, best first, by the shipped model; None for each where it was made for another backbone."""
+    """Of hypotheses that differ, given their scores, shape (T,), best first, by the shipped model; None for each of another backbone's."""
     model = Confidence.shipped()
     if model.fingerprint != fingerprint:
         return [None] * len(scores)

@@ -1,6 +1,6 @@
 """Which members of a memory are near a burst, of all there are: one product with their mean pooled tokens, stacked.
 
-Letters: N members, D token size, Q queries.
+Letters: D token size, Q queries.
 """
 
 from __future__ import annotations

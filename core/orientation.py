@@ -3,7 +3,7 @@
 The cameras' poses in each world are known, lengths in the images are not: a rotation follows, of the translation only a direction, of
 the scale nothing. The result has no place for one.
 
-Letters: M reference views, N target views, K correspondences, Q view pairs.
+Letters: M reference views, N target views, K correspondences.
 """
 
 from __future__ import annotations
@@ -26,6 +26,9 @@ from core.views import FloatArray
 MIN_CORRESPONDENCES = 8
 """Of a view pair whose essential matrix is estimated: five determine it, the rest tell whether it is right."""
 TRIALS = 1000
+"""Of a robust estimate, at most."""
+CERTAINTY = 0.9999
+"""Of having sampled right correspondences alone, with which it may stop before."""
 MIN_PARALLAX_DEG = 10.0
 """Angle between the two views of a pair that a direction is taken from: two views from one place have none."""
 
@@ -135,7 +138,7 @@ def _two_view(pair: MatchedPair, reference_view: int, target_view: int, seed: in
         return None
     seen = rays(views[0], matches.reference_patch), rays(views[1], matches.target_patch)
     params = cv2.UsacParams()
-    params.randomGeneratorState, params.maxIterations, params.confidence = seed, TRIALS, 0.9999
+    params.randomGeneratorState, params.maxIterations, params.confidence = seed, TRIALS, CERTAINTY
     params.threshold = _patch_angle(views[1])
     try:
         essential, mask = cv2.findEssentialMat(*seen, np.eye(3), np.eye(3), None, None, params)

@@ -26,9 +26,13 @@ from core.views import FloatArray
 MIN_POINTS = 6
 """Correspondences of a view that PnP is tried on, and patches of the target that must agree in the end."""
 PNP_TRIALS = 1000
+"""Of a robust estimate in one view, at most."""
+PNP_CERTAINTY = 0.9999
+"""Of having sampled right correspondences alone, with which it may stop before."""
 MIN_PARALLAX_DEG = 5.0
 """Angle under which two target views must see the object; below it, how large it is and how far away cannot be told apart."""
 REFINEMENTS = 3
+"""Rounds of least squares on what agrees, at most."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,7 +134,7 @@ def _scaled(sight: Sight, view: int, seed: int) -> list[Sim3]:
     params.randomGeneratorState = seed
     params.maxIterations = PNP_TRIALS
     params.threshold = float(sight.tolerance[mine][0])
-    params.confidence = 0.9999
+    params.confidence = PNP_CERTAINTY
     try:
         found, _, turn, shift, _ = cv2.solvePnPRansac(sight.points[mine], sight.rays[mine], np.eye(3), None, params=params)
     except cv2.error:

@@ -57,7 +57,7 @@ class Region:
 
 
 def region_of_sphere(camera: Camera, center_m: FloatArray, diameter_m: float) -> Region | None:
-    """Where a camera sees a sphere of the world; None where it is behind the camera."""
+    """Where a camera sees a sphere about a point of the world, shape (3,); None where it is behind the camera."""
     pixel, depth = camera.project(center_m)
     if depth <= 0:
         return None

@@ -1,6 +1,6 @@
 """Where to look from: a hemisphere of viewpoints around an object just seen (paper, "Robotic novel object pose rearrangement").
 
-Letters: V views, n viewpoints.
+Letters: n viewpoints, e excluded ones.
 """
 
 from __future__ import annotations
@@ -112,7 +112,8 @@ def infer_up(cameras: Sequence[Camera]) -> tuple[FloatArray, UpSource]:
 def exclude(request: ScanRequest, unreachable: Sequence[int]) -> ScanRequest:
     """The request without some of its viewpoints: each is replaced, in its place, by the direction farthest from all others.
 
-    A replacement is never within REACH_DEG of what was excluded; where no direction is left the list becomes shorter.
+    A replacement is never within REACH_DEG of what was excluded, nor within half of it of another viewpoint; where no such direction is
+    left the list becomes shorter.
     Raises InvalidInput for an index that there is not, and where no viewpoint is left.
     """
     count = len(request.world_from_camera)

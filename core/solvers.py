@@ -1,7 +1,4 @@
-"""From view pairs to a transform, as the paper and the work it compares with do it.
-
-Letters: M reference views, N target views, Q view pairs, K correspondences.
-"""
+"""From view pairs to a transform, as the paper and the work it compares with do it."""
 
 from __future__ import annotations
 

@@ -4,7 +4,7 @@ An object is compared with itself by patches of different views, never of the sa
 scan can show, and every turn is judged by that: a turn is a symmetry where each place of the surface finds its like again. A side
 that no view shows has no like, so nothing is claimed of it.
 
-Letters: M views, N points, C descriptor size, Q patches that are compared, P patches they are compared with, S rotations.
+Letters: Q patches that are compared, P patches they are compared with, S rotations.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """From a pose for each frame to a steady one: symmetric flips suppressed, noise smoothed, and the age of what is reported known.
 
-Letters: S symmetries, A alternatives.
+Letters: S symmetries.
 """
 
 from __future__ import annotations
@@ -99,7 +99,8 @@ def with_symmetries(poses: Sequence[Sim3], symmetries: FloatArray, center_m: Flo
 
 
 def blend(before: Sim3, after: Sim3, center_m: FloatArray, weight: float) -> Sim3:
-    """Between two poses, `weight` of the way: the object's middle goes straight, the rotation by the shortest arc, the scale by its log."""
+    """Between two poses, `weight` of the way: the object's middle, shape (3,), goes straight, the rotation by the shortest arc, the scale
+    by its log."""
     turn = Rotation.from_matrix(after.rotation @ before.rotation.T).as_rotvec()
     rotation = Rotation.from_rotvec(weight * turn).as_matrix() @ before.rotation
     scale = float(before.scale ** (1 - weight) * after.scale**weight)

@@ -2,8 +2,6 @@
 
 The last pose is refined against the reference views that look from where the target views look now, and scored there. A full solve
 (`core.pose`) is needed for the first pose, and again as soon as the score falls: the object was moved, or what is seen is no longer it.
-
-Letters: M reference views, N target views.
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""Worse depth, and cameras that are not where or what they say; the picture stays.
-
-Letters: H, W image height and width in pixels.
-"""
+"""Worse depth, and cameras that are not where or what they say; the picture stays."""
 
 from __future__ import annotations
 

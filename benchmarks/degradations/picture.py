@@ -1,6 +1,6 @@
 """Worse pictures: movement, wrong exposure, compression, few pixels. Blur and exposure are computed on light, not on sRGB's values.
 
-Letters: H, W image height and width in pixels; K a kernel's side.
+Letters: K a kernel's side in pixels.
 """
 
 from __future__ import annotations
@@ -85,7 +85,7 @@ def to_light(rgb: NDArray[np.uint8]) -> FloatArray:
 
 
 def from_light(light: FloatArray) -> NDArray[np.uint8]:
-    """The inverse of `to_light`; beyond black and white it is clipped."""
+    """The inverse of `to_light`, of any shape; beyond black and white it is clipped."""
     light = light.clip(0, 1)
     value = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
     return np.round(255 * value).astype(np.uint8)
