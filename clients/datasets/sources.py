@@ -15,7 +15,9 @@ def only_sequence(data: Path | str) -> folders.Sequence:
     """The one recorded object of `data`. Raises InvalidInput where there are several, and as `find_sequences`."""
     sequences = find_sequences(data)
     if len(sequences) > 1:
-        raise InvalidInput("data", f"{data} holds {len(sequences)} objects; name one, such as {sequences[0].path}")
+        prefix, _ = _parts(data)
+        one = f"{prefix}:{sequences[0].path}" if prefix else sequences[0].path
+        raise InvalidInput("data", f"{data} holds {len(sequences)} objects; name one, such as {one}")
     return sequences[0]
 
 
@@ -24,14 +26,17 @@ def find_sequences(data: Path | str) -> list[folders.Sequence]:
 
     Raises InvalidInput for an unknown format, a folder that is none, or one without sequences.
     """
-    prefix, mark, rest = str(data).partition(":")
-    if not mark or Path(data).is_dir():
-        return folders.find_sequences(Path(data))
-    if prefix not in FORMATS:
+    prefix, root = _parts(data)
+    if prefix and prefix not in FORMATS:
         raise InvalidInput(
             "data", f"{prefix!r} in {str(data)!r} is none of {', '.join(FORMATS)}; a folder in the data layout has no prefix"
         )
-    root = Path(rest).expanduser()
     if not root.is_dir():
         raise InvalidInput("data", f"{root} is no folder; name the one that holds the recordings")
-    return FORMATS[prefix](root)
+    return FORMATS[prefix](root) if prefix else folders.find_sequences(root)
+
+
+def _parts(data: Path | str) -> tuple[str, Path]:
+    """The format's prefix, empty for the data layout, and the folder."""
+    prefix, mark, rest = str(data).partition(":")
+    return (prefix, Path(rest).expanduser()) if mark and not Path(data).is_dir() else ("", Path(data))

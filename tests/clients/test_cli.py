@@ -143,7 +143,7 @@ def test_photographs_become_a_folder_in_the_data_layout(recordings: list[Sequenc
     [
         (["convert", "kitti:nowhere", "out"], "'kitti' in 'kitti:nowhere' is none of bop, co3d"),
         (["categories", "list", "--url", "http://127.0.0.1:9"], "onelook serve"),
-        (["observe", "nowhere"], "no sequence.json below nowhere"),
+        (["observe", "nowhere"], "nowhere is no folder"),
     ],
 )
 def test_errors_are_one_sentence_with_the_remedy(words: list[str], says: str) -> None:

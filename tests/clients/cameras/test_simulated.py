@@ -31,5 +31,5 @@ def test_photographs_cannot_be_played(recordings: list[Sequence]) -> None:
 
 
 def test_a_folder_that_is_none_is_named(tmp_path: Path) -> None:
-    with pytest.raises(InvalidInput, match=r"no sequence\.json"):
+    with pytest.raises(InvalidInput, match=r"is no folder"):
         recorded(tmp_path / "none")

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from clients.datasets.folders import Sequence
-from clients.datasets.sources import FORMATS, find_sequences
+from clients.datasets.sources import FORMATS, find_sequences, only_sequence
 from core.errors import InvalidInput
 
 
@@ -46,6 +46,16 @@ def test_every_format_is_a_row_of_the_page_on_data(name: str) -> None:
     assert name in listed, f"docs/data.md has no row `{name}:FOLDER` in its first table"
 
 
-def test_a_folder_that_is_none_is_named() -> None:
+@pytest.mark.parametrize("data", ["bop:/nowhere", "/nowhere"])
+def test_a_folder_that_is_none_is_named(data: str) -> None:
     with pytest.raises(InvalidInput, match="/nowhere is no folder"):
-        find_sequences("bop:/nowhere")
+        find_sequences(data)
+
+
+def test_of_several_objects_one_is_named_as_it_can_be_asked_for(tmp_path: Path) -> None:
+    for name in ("a", "b"):
+        (tmp_path / name).mkdir()
+        cv2.imwrite(str(tmp_path / name / "0.png"), np.zeros((40, 40, 3), np.uint8))
+    with pytest.raises(InvalidInput, match=f"2 objects; name one, such as images:{tmp_path / 'a'}"):
+        only_sequence(f"images:{tmp_path}")
+    assert only_sequence(f"images:{tmp_path / 'a'}").instance == "a"
