@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import pytest
@@ -30,6 +31,7 @@ def test_rate_latency_and_what_was_dropped() -> None:
     assert row.p99_ms == pytest.approx(700, abs=5)
 
 
-def test_a_kind_of_one_object_has_nothing_to_follow(tmp_path: Path) -> None:
-    with pytest.raises(InvalidInput):
-        track.run(lambda memory, grid, warm: pytest.fail("nothing is to be served"), None, grids=[16], rate_hz=15, seconds=1, data=tmp_path)
+def test_a_kind_of_one_object_has_nothing_to_follow(recorded: Path) -> None:
+    shutil.rmtree(recorded / "egg" / "small")
+    with pytest.raises(InvalidInput, match="one teaches it, the other is followed"):
+        track.run(lambda memory, grid, warm: pytest.fail("nothing is to be served"), None, grids=[16], rate_hz=15, seconds=1, data=recorded)

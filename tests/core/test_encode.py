@@ -51,7 +51,7 @@ def test_the_object_is_found_without_its_mask(foreground: str, backbone: Backbon
 
 def test_a_second_pass_that_sees_less_finds_the_same_object(backbone: Backbone, burst: Burst, encoded: EncodedBurst) -> None:
     near = Encoder(backbone, EncoderConfig(context=2)).encode(burst)
-    for view, whole in zip(near.views, encoded.views):
+    for view, whole in zip(near.views, encoded.views, strict=True):
         assert view.window == whole.window
         both = {tuple(cell) for cell in view.cells} & {tuple(cell) for cell in whole.cells}
         assert len(both) > 0.9 * max(len(view.cells), len(whole.cells))
@@ -65,7 +65,7 @@ def test_points_lie_on_the_object(encoded: EncodedBurst, sequence: Sequence) -> 
 
 def test_encoding_again_gives_the_same_numbers(encoded: EncodedBurst, backbone: Backbone, burst: Burst) -> None:
     again = Encoder(backbone).encode(burst)
-    assert all(np.array_equal(first.descriptors, second.descriptors) for first, second in zip(encoded.views, again.views))
+    assert all(np.array_equal(first.descriptors, second.descriptors) for first, second in zip(encoded.views, again.views, strict=True))
 
 
 def moved_burst(burst: Burst, moved: Sim3) -> Burst:

@@ -30,7 +30,7 @@ def test_of_a_view_of_the_table_what_lies_within_the_object_is_left_at_most(pain
     encoded = with_table(painted.encode(8), 2)
     kept = consistent_only(encoded)
     assert len(kept.views[2].cells) < 0.2 * len(encoded.views[2].cells)
-    assert all(left is before for index, (left, before) in enumerate(zip(kept.views, encoded.views)) if index != 2)
+    assert all(left is before for index, (left, before) in enumerate(zip(kept.views, encoded.views, strict=True)) if index != 2)
     np.testing.assert_allclose(build_reference(kept).box.extent_m, painted.reference(8).box.extent_m, rtol=0.1)
 
 
@@ -47,7 +47,7 @@ def test_of_a_view_that_shows_a_wall_too_the_object_stays(painted: PaintedObject
 
 def test_all_sides_of_an_object_stay(painted: PaintedObject, moved: Sim3) -> None:
     encoded = painted.encode(12, moved)
-    assert all(kept is view for kept, view in zip(consistent_only(encoded).views, encoded.views))
+    assert all(kept is view for kept, view in zip(consistent_only(encoded).views, encoded.views, strict=True))
 
 
 def test_of_two_views_that_differ_both_stay(painted: PaintedObject) -> None:
@@ -66,7 +66,7 @@ def test_what_is_before_the_object_in_one_view_goes(painted: PaintedObject) -> N
     found = replace(encoded, views=(*encoded.views[:3], before_the_object(view, 0.6), *encoded.views[4:]))
     kept = consistent_only(found).views
     np.testing.assert_array_equal(kept[3].points_m, view.points_m[int(0.6 * len(view.cells)) :])
-    assert all(left is before for index, (left, before) in enumerate(zip(kept, encoded.views)) if index != 3)
+    assert all(left is before for index, (left, before) in enumerate(zip(kept, encoded.views, strict=True)) if index != 3)
 
 
 def test_patches_without_depth_are_not_judged(painted: PaintedObject) -> None:
@@ -87,4 +87,4 @@ def test_cameras_that_are_all_wrong_take_nothing_out(painted: PaintedObject) -> 
         return replace(view, camera=replace(view.camera, world_from_camera=pose), points_m=view.points_m + np.float32(10.0 * index))
 
     astray = replace(encoded, views=tuple(moved(view, index) for index, view in enumerate(encoded.views)))
-    assert all(kept is view for kept, view in zip(consistent_only(astray).views, astray.views))
+    assert all(kept is view for kept, view in zip(consistent_only(astray).views, astray.views, strict=True))
