@@ -24,7 +24,7 @@ Chosen = Annotated[list[str] | None, typer.Option("--category", help="Name, id o
 
 @app.callback(invoke_without_command=True)
 def memory(context: typer.Context, url: Url = URL, json: Json = False) -> None:
-    """Show what the service says of its memory, or work on a memory's folder."""
+    """Show what the service says of itself and its memory, or work on a memory's folder."""
     if context.invoked_subcommand is not None:
         return
     with RobotClient(url) as robot:

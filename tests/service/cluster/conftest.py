@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -15,6 +14,8 @@ from pathlib import Path
 
 import httpx
 import pytest
+
+from clients.simulator.local_service import free_port
 
 ROOT = Path(__file__).parents[3]
 START_S = 600
@@ -43,12 +44,6 @@ class OnRay:
         while pid > 1 and pid != self.child.pid:
             pid = int(Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[1])
         return pid == self.child.pid
-
-
-def free_port() -> int:
-    """One that nobody has yet."""
-    with socket.create_server(("127.0.0.1", 0)) as probe:
-        return int(probe.getsockname()[1])
 
 
 @contextmanager
