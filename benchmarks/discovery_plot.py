@@ -8,6 +8,8 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
+from benchmarks.pictures import save
+
 PAPER = (0.0, 26.0)
 """FP and FN that the paper reports, in percent, on CO3D with DINO."""
 
@@ -33,5 +35,4 @@ def plot(file: Path, rows: Sequence[Mapping[str, Any]], title: str) -> None:
     growth.plot(truth, "k--", label="true categories met")
     growth.set(xlabel="bursts presented", ylabel="categories, at 1 % false positives")
     growth.legend(fontsize=8)
-    figure.suptitle(title, fontsize=10)
-    figure.savefig(file, dpi=110)
+    save(figure, file, title)

@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING
 
 from matplotlib.figure import Figure
 
+from benchmarks.pictures import save
+
 if TYPE_CHECKING:
     from benchmarks.growth import GrowthRow
 
 SIZE = (12, 3.8)
-DPI = 110
 ROOM = 0.6
 """Share of an axis that is added above for the legend."""
 TARGET_MS = 10.0
@@ -46,6 +47,4 @@ def plot_growth(file: Path, rows: Sequence[GrowthRow], title: str) -> None:
         low, high = panel.get_ylim()
         panel.set_ylim(low, high * (high / low) ** ROOM)
         panel.legend(fontsize=8, loc="upper left")
-    file.parent.mkdir(parents=True, exist_ok=True)
-    figure.suptitle(title, fontsize=10)
-    figure.savefig(file, dpi=DPI)
+    save(figure, file, title)

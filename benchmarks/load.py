@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Sequence
-from contextlib import ExitStack
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -68,17 +68,12 @@ def run(
 ) -> list[LoadRow]:
     """A row for each number of robots; prints a table.
 
-    The service is one of its own with an empty memory, unless `url` names one on this machine. Raises InvalidInput for one elsewhere.
+    The service is that of `taught_service`; raises InvalidInput for one on another machine.
     """
     sequences = find_sequences(data_or_samples(data))
-    with ExitStack() as open_:
-        if url is None:
-            folder = Path(open_.enter_context(TemporaryDirectory()))
-            url = open_.enter_context(local_service(folder / "memory", folder / "log"))
-        require_loopback(url)
-        teach(url, sequences)
+    with taught_service(url, sequences, {}) as address:
         errand = observing([folders.load_burst(each, range(views)) for each in sequences])
-        rows = [load_row(count, seconds, record) for count, record in _levels(url, robots, seconds, errand, seed)]
+        rows = [load_row(count, seconds, record) for count, record in _levels(address, robots, seconds, errand, seed)]
     meta = {"benchmark": "load", "seconds": seconds, "views": views, "seed": seed}
     report(f"Load, {views} views an observation, {seconds:.0f} s each", rows, meta, json)
     if plot is not None:
@@ -121,6 +116,21 @@ def load_row(robots: int, seconds: float, record: Record) -> LoadRow:
         max(sample.resident_mb for sample in record.samples),
         (record.samples[-1].cpu_s - record.samples[0].cpu_s) / max(1, len(answered)),
     )
+
+
+@contextmanager
+def taught_service(url: str | None, sequences: Sequence[folders.Sequence], settings: Mapping[str, str]) -> Iterator[str]:
+    """The address of a service that knows some categories: the one at `url` on this machine, or else one of its own, with these settings.
+
+    Raises InvalidInput for a service on another machine.
+    """
+    with ExitStack() as open_:
+        if url is None:
+            folder = Path(open_.enter_context(TemporaryDirectory()))
+            url = open_.enter_context(local_service(folder / "memory", folder / "log", settings))
+        require_loopback(url)
+        teach(url, sequences)
+        yield url
 
 
 def teach(url: str, sequences: Sequence[folders.Sequence]) -> None:

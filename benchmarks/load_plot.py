@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from matplotlib.figure import Figure
 
 from benchmarks.crowd import FATES
+from benchmarks.pictures import save
 
 if TYPE_CHECKING:
     from benchmarks.crowd import Record
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
 SIZE = (12, 3.8)
 HEADROOM = 1.35
 """Above the curves, for what they mean."""
-DPI = 110
 
 
 def plot_load(file: Path, rows: Sequence[LoadRow], title: str) -> None:
@@ -45,7 +45,7 @@ def plot_load(file: Path, rows: Sequence[LoadRow], title: str) -> None:
         panel.set(xlabel="robots at once", ylim=(0, HEADROOM * panel.get_ylim()[1]))
         panel.legend(fontsize=8, loc="upper left")
     memory.legend(fontsize=8, loc="lower right")
-    _save(figure, file, title)
+    save(figure, file, title)
 
 
 def plot_soak(file: Path, record: Record, title: str) -> None:
@@ -63,10 +63,4 @@ def plot_soak(file: Path, record: Record, title: str) -> None:
         )
     answers.set(xlabel="minutes", ylabel="seconds of an errand", ylim=(0, None))
     answers.legend(fontsize=8)
-    _save(figure, file, title)
-
-
-def _save(figure: Figure, file: Path, title: str) -> None:
-    file.parent.mkdir(parents=True, exist_ok=True)
-    figure.suptitle(title, fontsize=10)
-    figure.savefig(file, dpi=DPI)
+    save(figure, file, title)

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from benchmarks.pair_jobs import PairJob, pair_jobs
 from benchmarks.parallel import map_jobs
+from benchmarks.pictures import save
 from benchmarks.tables import print_table, write_json
 from core.backbones import load_backbone
 from core.confidence import SHIPPED, Confidence, evidence
@@ -126,7 +127,7 @@ def _plot(file: Path, rows: Sequence[dict[str, float]], title: str) -> None:
         axes.annotate(f"{row['poses']}", (row["confidence"], row["right"]), textcoords="offset points", xytext=(6, -12), fontsize=8)
     axes.set(xlim=(0, 101), ylim=(0, 101), xlabel="confidence, %", ylabel="rotation within 30°, %", title=title)
     axes.legend(loc="upper left")
-    figure.savefig(file, dpi=110)
+    save(figure, file)
 
 
 if __name__ == "__main__":

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from benchmarks.pictures import save
 from benchmarks.tables import Row
 
 FILE = "robustness.png"
@@ -22,7 +23,7 @@ LINES = {
 """Of each figure its name, its style, and what it is a share of."""
 
 
-def plot(folder: Path, rows: Sequence[Row]) -> Path:
+def plot(folder: Path, rows: Sequence[Row]) -> None:
     """Writes FILE below `folder`: the undegraded first; shares with one standard error."""
     clean, breaks = rows[0], [row for row in rows if "acc30" not in row]
     down = -(-len(breaks) // COLUMNS)
@@ -37,9 +38,7 @@ def plot(folder: Path, rows: Sequence[Row]) -> Path:
     for axes in grid.flat[len(breaks) :]:
         axes.axis("off")
     figure.legend(*grid[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=len(LINES))
-    folder.mkdir(parents=True, exist_ok=True)
-    figure.savefig(folder / FILE, dpi=110)
-    return folder / FILE
+    save(figure, folder / FILE)
 
 
 def _draw(axes: Any, curve: Sequence[Row]) -> None:

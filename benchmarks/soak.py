@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Sequence
-from contextlib import ExitStack
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from benchmarks.crowd import FATES, Errand, Record, Sample, crowd, require_loopback
-from benchmarks.load import teach
+from benchmarks.crowd import FATES, Errand, Record, Sample, crowd
+from benchmarks.load import taught_service
 from benchmarks.load_plot import plot_soak
 from benchmarks.parallel import bar
 from benchmarks.tables import print_table, write_json
@@ -20,7 +18,6 @@ from clients.asynchronous import AsyncRobotClient
 from clients.datasets import folders
 from clients.datasets.samples import data_or_samples
 from clients.datasets.sources import find_sequences
-from clients.simulator.local_service import local_service
 from core.errors import InvalidInput
 from core.views import Burst
 
@@ -67,17 +64,12 @@ def run(
 ) -> SoakResult:
     """Prints one line; raises InvalidInput where anything failed or the process grew by more than the share `most_growth`.
 
-    The service is as in `load.run`.
+    The service is that of `load.taught_service`.
     """
     sequences = find_sequences(data_or_samples(data))
-    with ExitStack() as open_:
-        if url is None:
-            folder = Path(open_.enter_context(TemporaryDirectory()))
-            url = open_.enter_context(local_service(folder / "memory", folder / "log", SETTINGS))
-        require_loopback(url)
-        teach(url, sequences)
+    with taught_service(url, sequences, SETTINGS) as address:
         errand = living([folders.load_burst(each, range(views)) for each in sequences])
-        record = _soak(url, robots, 60 * minutes, errand, seed)
+        record = _soak(address, robots, 60 * minutes, errand, seed)
     result = soak_result(minutes, robots, record)
     if json is not None:
         write_json(json, {"benchmark": "soak", "seed": seed, **asdict(result)}, [asdict(sample) for sample in record.samples])

@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
+from benchmarks.pictures import save
+
 ROOM_FOR_MS = 1.12
 """The axis, of the longest bar's end: its milliseconds are written behind it."""
 
@@ -28,4 +30,4 @@ def plot(file: Path, stages: Sequence[tuple[str, float, float]], title: str) -> 
     axes.set_yticks(range(len(stages)), [name for name, _, _ in stages])
     axes.set_xlim(0, ROOM_FOR_MS * end)
     axes.legend(loc="lower left")
-    figure.savefig(file, dpi=110)
+    save(figure, file)
