@@ -30,7 +30,7 @@ from store.contents import files_of
 from store.folders import FileSum, make_parents, partial_of, problem, sync
 from store.instances import TOKENS, damaged
 from store.progress import Progress, untold
-from store.records import Assignment, Category
+from store.records import LONGEST_NAME, Assignment, Category
 from store.times import now
 
 MANIFEST = "manifest.json"
@@ -40,7 +40,7 @@ FILE_NAME = re.compile(r"\d{3}_(rgb|depth|mask)\.png|cameras\.json|reference(-\d
 Id = Annotated[str, StringConstraints(pattern="^[0-9a-f]{32}$")]
 Sha256 = Annotated[str, StringConstraints(pattern="^[0-9a-f]{64}$")]
 Time = Annotated[str, StringConstraints(pattern=r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d[.0-9]*\+00:00$")]
-Name = Annotated[str, StringConstraints(max_length=200)]
+Name = Annotated[str, StringConstraints(max_length=LONGEST_NAME)]
 
 
 class _Part(BaseModel):

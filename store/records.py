@@ -20,6 +20,8 @@ from core.scan import ScanRequest
 from core.sim3 import Sim3
 from core.views import Burst, FloatArray
 
+LONGEST_NAME = 200
+"""Of whatever people name."""
 ScanState = Literal["requested", "collecting", "completed", "expired"]
 Assignment = Literal["scan", "decision", "named"]
 """How a burst came to a category: by the scan it was learnt from, by the decision, or by the caller's word."""

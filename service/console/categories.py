@@ -17,8 +17,8 @@ from service.deps import AgentDep
 from service.exchange import MemoryRoute
 from service.gallery import CategoryGallery
 from service.routes.png import Side, png
-from service.schemas.fields import LONGEST_NAME
 from store.overview import Order
+from store.records import LONGEST_NAME
 
 router = APIRouter(prefix="/categories", route_class=Page, include_in_schema=False)
 PAGE = 48

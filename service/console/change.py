@@ -13,8 +13,7 @@ from service.agent import Agent
 from service.console.pages import ConsoleActorDep, Page, query, render
 from service.console.words import change_words
 from service.deps import AgentDep, WorkDep
-from service.schemas.fields import LONGEST_NAME
-from store.records import AuditEntry
+from store.records import LONGEST_NAME, AuditEntry
 
 router = APIRouter(route_class=Page, include_in_schema=False)
 Name = Annotated[str, Form(max_length=LONGEST_NAME)]

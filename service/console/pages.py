@@ -22,6 +22,7 @@ from service.errors import problem_of, validation_problem
 from service.guarded import Answering, GuardedRoute
 from service.refusals import NoKey
 from service.schemas.problem import Problem
+from store.records import LONGEST_NAME
 
 TEMPLATES = Path(__file__).parent / "templates"
 HEADERS = {
@@ -68,7 +69,7 @@ def _environment() -> Environment:
     environment = Environment(
         loader=FileSystemLoader(TEMPLATES), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
-    environment.globals.update(navigation=NAVIGATION, asset=asset_url, query=query)
+    environment.globals.update(navigation=NAVIGATION, asset=asset_url, query=query, longest_name=LONGEST_NAME)
     environment.filters.update(FILTERS)
     return environment
 

@@ -25,7 +25,7 @@ def sign_in(request: Request, agent: AgentDep, next: Next = "/") -> Response:
     """Asks for a key, where the service does."""
     if not agent.memory.keys.required():
         return RedirectResponse("/", 303)
-    return render(request, "sign_in.html", next=own_address(next), wrong=False)
+    return render(request, "sign_in.html", next=own_address(next), wrong=False, longest_key=LONGEST_KEY)
 
 
 @router.post("/sign-in")
@@ -39,7 +39,7 @@ def begin_session(
     """Goes on to where the person was going."""
     found = agent.memory.keys.find(key.strip())
     if found is None:
-        return render(request, "sign_in.html", 401, next=own_address(next), wrong=True)
+        return render(request, "sign_in.html", 401, next=own_address(next), wrong=True, longest_key=LONGEST_KEY)
     span = timedelta(hours=settings.session_h)
     answer = RedirectResponse(own_address(next), 303)
     token = agent.memory.sessions.begin(found, span)

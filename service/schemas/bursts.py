@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
-from service.schemas.fields import LONGEST_NAME
+from store.records import LONGEST_NAME
 
 Numbers = list[float] | list[list[float]]
 

@@ -6,8 +6,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-LONGEST_NAME = 200
-"""Of whatever people name."""
+from store.records import LONGEST_NAME
 
 CreatedAt = Annotated[str, Field(description="ISO 8601, UTC.", examples=["2026-01-31T12:00:00.000+00:00"])]
 Name = Field(None, min_length=1, max_length=LONGEST_NAME, description="What people call it; null where nobody said.", examples=["cup"])

@@ -6,9 +6,10 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from core.rearrange import Anchor
 from service import goals
-from service.schemas.fields import LONGEST_NAME, CreatedAt
+from service.schemas.fields import CreatedAt
 from service.schemas.geometry import Direction, Matrix4, Rigid, Similarity, as_up
 from store import records
+from store.records import LONGEST_NAME
 
 ANCHOR = (
     "Which point goes exactly to its goal: the object's `center`, or the middle of its `base`, so that a smaller one stands on the same "

@@ -18,10 +18,11 @@ from core.sim3 import Sim3
 from core.views import FloatArray
 from service.agent import ObserveOptions
 from service.schemas import scans
-from service.schemas.fields import LONGEST_NAME, CreatedAt
+from service.schemas.fields import CreatedAt
 from service.schemas.geometry import Box, Direction, Matrix4, Quaternion, Similarity, Stretch, as_up
 from service.schemas.quality import Grounds
 from store import records
+from store.records import LONGEST_NAME
 
 PixelBox = Annotated[list[float], Field(min_length=4, max_length=4)]
 
