@@ -168,7 +168,7 @@ def ball_memory(tmp_path_factory: Any, colour_backbone: Any, look: Any, parts: A
 
 @pytest.fixture
 def ball(ball_memory: tuple[Path, dict[str, Any]]) -> dict[str, Any]:
-    """A category that the service knows from its start."""
+    """A category that the service knows from its start; the observation and the scan that made it are kept, too."""
     return dict(ball_memory[1])
 
 
