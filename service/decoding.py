@@ -70,7 +70,7 @@ def decode_parts(parts: Parts, limits: BurstLimits) -> Upload:
     about = _about(parts.burst, limits)
     views = len(parts.rgb)
     limits.require_views("rgb", views)
-    for name, found in (("depth", len(parts.depth)), ("mask", len(parts.mask)), ("burst.views", len(about.views or ()))):
+    for name, found in (("depth", len(parts.depth)), ("mask", len(parts.mask)), ("views", len(about.views or ()))):
         if found not in (0, views):
             raise InvalidInput(name, f"has {found} entries for {views} rgb images; send one a view, in the same order, or none")
     alone = not (about.views or parts.depth or parts.mask)
@@ -131,7 +131,8 @@ def _about(part: str | bytes, limits: BurstLimits) -> BurstPart:
         return BurstPart.model_validate_json(part)
     except ValidationError as error:
         first = error.errors()[0]
-        field = field_path(("burst", *first["loc"]))
+        # Views are named as in an npz, where there is no part `burst`.
+        field = field_path(first["loc"] if first["loc"][:1] == ("views",) else ("burst", *first["loc"]))
         if first["type"] == "json_invalid":
             raise InvalidInput(
                 field, f'is not JSON ({first["ctx"]["error"]}); send an object such as {{"depth_scale": 0.001, "views": […]}}'
@@ -142,7 +143,7 @@ def _about(part: str | bytes, limits: BurstLimits) -> BurstPart:
 def _images(contents: Sequence[bytes], name: str, decode: Callable[[bytes, str], NDArray[Any]], limits: BurstLimits) -> list[NDArray[Any]]:
     images, pixels = [], 0
     for index, content in enumerate(contents):
-        images.append(decode(content, f"{name}[{index}]"))
+        images.append(decode(content, f"views[{index}].{name}"))
         pixels += images[-1].shape[0] * images[-1].shape[1]
         limits.require_pixels(name, pixels)
     return images

@@ -153,7 +153,7 @@ def test_files_that_are_no_burst_are_told_so(tab):
     name = f"{MARKUP}.png"
     page.locator("#file-input").set_input_files([{"name": name, "mimeType": "image/png", "buffer": b"not a picture"}])
     page.get_by_role("button", name="Ask what it is").click()
-    expect(page.get_by_role("alert")).to_contain_text("rgb[0]: is not an image; send a JPEG or PNG colour image")
+    expect(page.get_by_role("alert")).to_contain_text("views[0].rgb: is not an image; send a JPEG or PNG colour image")
     page.locator("#file-input").set_input_files([{"name": name + ".txt", "mimeType": "text/plain", "buffer": b"no"}])
     expect(page.get_by_role("alert")).to_contain_text("There is no JPEG or PNG among these files.")
     expect(page.get_by_role("button", name="Ask what it is")).to_be_disabled()

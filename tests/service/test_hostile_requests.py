@@ -18,7 +18,7 @@ def burst_part(files, content):
 
 PARTS = {
     "a million views": (b'{"views": [' + b",".join([b"{}"] * 1_000_000) + b"]}", "burst", "ONELOOK_MAX_VIEWS"),
-    "more views than images": (b'{"views": [' + b",".join([b"{}"] * 5_000) + b"]}", "burst.views", "5000 entries for 6 rgb images"),
+    "more views than images": (b'{"views": [' + b",".join([b"{}"] * 5_000) + b"]}", "views", "5000 entries for 6 rgb images"),
     "deep nesting": (b'{"views": ' + b"[" * 50_000, "burst", "is not JSON"),
     "a number of ten thousand digits": (b'{"depth_scale": ' + LONG_NUMBER + b"}", "burst", "is not JSON"),
     "an entry of ten thousand digits": (b'{"views": [{"K": [' + b",".join([LONG_NUMBER] * 9) + b"]}]}", "burst", "is not JSON"),

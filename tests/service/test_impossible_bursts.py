@@ -42,7 +42,9 @@ def test_saturated_depth(client, look, parts):
         measured = [cv2.imdecode(np.frombuffer(each, np.uint8), cv2.IMREAD_UNCHANGED) > 0 for each in files["depth"]]
         files["depth"] = [cv2.imencode(".png", each.astype(np.uint16) * 65535)[1].tobytes() for each in measured]
 
-    refused(client.post("/v1/observations", files=parts(look(), full)), 422, "depth[0]", "100% of what it measured is 65535", "send 0")
+    refused(
+        client.post("/v1/observations", files=parts(look(), full)), 422, "views[0].depth", "100% of what it measured is 65535", "send 0"
+    )
 
 
 def edited(**changes):
