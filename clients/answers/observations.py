@@ -13,6 +13,7 @@ import numpy as np
 
 from clients.answers.categories import CategorySimilarity
 from clients.answers.scans import ScanRequest
+from core.affine9 import Affine9
 from core.sim3 import Sim3
 from core.views import FloatArray
 
@@ -61,6 +62,12 @@ class Pose:
     """Other transforms that were considered, best first."""
     symmetries: FloatArray
     """Rotations about the object frame's origin, in that frame, after which the pose means the same: (w, x, y, z), shape (S, 4)."""
+    boxes_px: tuple[FloatArray | None, ...] = ()
+    """Of each view of the burst (left, top, right, bottom) around the box's corners, pixels; None where a corner is behind the camera."""
+    target_from_object: Affine9 | None = None
+    """With dof=9: from the reference's object frame to the world frame of the burst, a scale for each axis."""
+    not_9d_because: str | None = None
+    """Why there is none though it was asked for."""
 
     @property
     def matrix(self) -> FloatArray:
@@ -98,6 +105,9 @@ class Pose:
             fields["confidence"],
             tuple(Alternative.from_json(each) for each in fields["alternatives"]),
             np.array(fields["symmetries"], dtype=float).reshape(-1, 4),
+            tuple(None if box is None else np.array(box, dtype=float) for box in fields["boxes_px"]),
+            _affine9(fields["target_from_object"]) if fields["target_from_object"] else None,
+            fields["not_9d_because"],
         )
 
 
@@ -167,3 +177,9 @@ class Observation(Generic[S]):
 def sim3_from_json(fields: Mapping[str, Any]) -> Sim3:
     """A similarity of an answer."""
     return Sim3.from_matrix(np.array(fields["matrix"]))
+
+
+def _affine9(fields: Mapping[str, Any]) -> Affine9:
+    scales = np.array(fields["scales"])
+    matrix = np.array(fields["matrix"])
+    return Affine9(scales, matrix[:3, :3] / scales, matrix[:3, 3])

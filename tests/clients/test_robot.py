@@ -10,11 +10,13 @@ import numpy as np
 import pytest
 
 from clients import errors
+from clients.answers.categories import Category
 from clients.datasets.folders import Sequence, load_burst
 from clients.exchange import Retry
 from clients.robot import RobotClient
 from clients.simulator.replay import ReplayWorld
 from core.errors import InvalidInput, OneLookError
+from core.views import Burst
 
 
 def answering(handler: httpx.MockTransport) -> RobotClient:
@@ -37,6 +39,21 @@ def test_a_novel_object_is_scanned_learnt_and_recognised(robot: RobotClient, rec
     assert again.pose.world_from_object.shape == (4, 4)
     assert again.timings_ms["total"] > 0
     assert again.similarities[0].category_id == category.id
+
+
+def test_a_pose_has_its_rectangle_in_each_view_and_nine_dimensions(robot: RobotClient, burst: Burst, learnt: Category) -> None:
+    seen = robot.observe(burst, category_id=learnt.id, dof=9)
+    assert seen.pose is not None
+    told, stretched = seen.raw["pose"], seen.pose.target_from_object
+    assert stretched is not None, seen.pose.not_9d_because
+    np.testing.assert_allclose(stretched.as_matrix(), told["target_from_object"]["matrix"], atol=1e-9)
+    np.testing.assert_allclose(stretched.rotation @ stretched.rotation.T, np.eye(3), atol=1e-9)
+    for view, box_px in zip(burst.views, seen.pose.boxes_px, strict=True):
+        assert view.camera is not None
+        pixels, _ = view.camera.project(seen.pose.corners_m)
+        assert box_px is not None
+        height, width = view.size
+        np.testing.assert_allclose(box_px[:2], np.clip(pixels.min(axis=0), 0, [width - 1, height - 1]), atol=1e-6)
 
 
 def test_a_scan_asks_for_camera_poses_that_a_world_answers(robot: RobotClient, recordings: list[Sequence]) -> None:
