@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, TypeVar
 
 from fastapi import Depends, Header, Request
 from fastapi.exceptions import RequestValidationError
-from pydantic import BaseModel, ValidationError
+from pydantic import ValidationError
 from starlette.datastructures import FormData, UploadFile
 from starlette.exceptions import HTTPException
 from starlette.formparsers import MultiPartException, MultiPartParser
@@ -22,6 +22,7 @@ from service.goals import Source
 from service.limits import media_type
 from service.metrics import Metrics
 from service.npz import decode_npz
+from service.schemas.bursts import Seen
 from service.settings import Settings
 from service.state import running
 from service.work import WorkQueue
@@ -119,20 +120,16 @@ class Sent:
     """Of the burst."""
 
 
-def read_sent(model: type[BaseModel]) -> Callable[[Request], Coroutine[Any, Any, Callable[[], Sent]]]:
-    """A dependency: a burst in either form, to be decoded where work is done, or JSON of `model`, which names an observation."""
-
-    async def sent(request: Request) -> Callable[[], Sent]:
-        if media_type(request.headers) != "application/json":
-            decode = await read_upload(request)
-            return lambda: _sent(decode())
-        try:
-            named: Any = model.model_validate_json(await request.body())
-        except ValidationError as error:
-            raise RequestValidationError(error.errors()) from None
-        return lambda: Sent(named.observation_id, None)
-
-    return sent
+async def _read_sent(request: Request) -> Callable[[], Sent]:
+    """A burst in either form, to be decoded where work is done, or JSON that names an observation."""
+    if media_type(request.headers) != "application/json":
+        decode = await read_upload(request)
+        return lambda: _sent(decode())
+    try:
+        seen = Seen.model_validate_json(await request.body())
+    except ValidationError as error:
+        raise RequestValidationError(error.errors()) from None
+    return lambda: Sent(seen.observation_id, None)
 
 
 def _sent(upload: Upload) -> Sent:
@@ -182,3 +179,4 @@ CallerDep = Annotated[Caller, Depends(_caller)]
 WorkDep = Annotated[RequestWork, Depends(_work)]
 ActorDep = Annotated[str | None, Depends(_actor)]
 UploadDep = Annotated[Decode, Depends(read_upload)]
+SentDep = Annotated[Callable[[], Sent], Depends(_read_sent)]

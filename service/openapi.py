@@ -10,13 +10,11 @@ from pydantic.json_schema import models_json_schema
 
 from service.access import needed_role
 from service.exchange import KEY, LONGEST_KEY, MemoryRoute
-from service.schemas.bursts import BurstPart
-from service.schemas.goals import Seen
+from service.schemas.bursts import BurstPart, Seen
 from service.schemas.problem import Problem, problems
-from service.schemas.scans import ScanBegin
 from store.keys import Role
 
-MODELS = (BurstPart, Problem, ScanBegin, Seen)
+MODELS = (BurstPart, Problem, Seen)
 IF_NONE_MATCH = {
     "name": "If-None-Match",
     "in": "header",

@@ -11,10 +11,14 @@ from pydantic import Field
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 from core.backbones import EMBEDDED
+from core.calibration import LARGEST_RATE
 from core.errors import InvalidInput
 from core.scores import DEFAULT_SCORE
 from service.logs import Form
 from store.retention import Retention
+
+SMALLEST_RATE = 1e-4
+"""Of false answers that may be asked for: how rare rarer ones are, some hundreds of decisions do not tell."""
 
 
 class Settings(BaseSettings):
@@ -32,7 +36,10 @@ class Settings(BaseSettings):
     score: str = Field(DEFAULT_SCORE, description="How similar two bursts are, for the decision.")
     threshold: float | None = Field(None, description="Least similarity of a known object; the score's own default where left out.")
     false_known_rate: float = Field(
-        0.01, ge=1e-4, le=0.5, description="Of objects of no known category, the share that may be called known; of score `best`."
+        0.01,
+        ge=SMALLEST_RATE,
+        le=LARGEST_RATE,
+        description="Of objects of no known category, the share that may be called known; of score `best`.",
     )
     variant: str = Field("best", description="Variant of the pose pipeline.")
     max_upload_mb: int = Field(128, gt=0, description="Largest request body, in megabytes of 1 000 000 bytes.")

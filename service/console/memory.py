@@ -7,6 +7,7 @@ from typing import Annotated, Any
 from fastapi import APIRouter, BackgroundTasks, Form, Query, Request, Response
 from fastapi.responses import HTMLResponse, RedirectResponse
 
+from core.calibration import LARGEST_RATE
 from core.scores import BEST
 from service.agent import Agent
 from service.console.change import done
@@ -16,6 +17,7 @@ from service.console.token_map import token_map
 from service.deps import AgentDep, SettingsDep, WorkDep
 from service.routes.memory import export_memory
 from service.schemas.memory import ExportQuery, MemoryInfo
+from service.settings import SMALLEST_RATE
 from store.records import Errand
 
 router = APIRouter(prefix="/memory", route_class=Page, include_in_schema=False)
@@ -63,7 +65,11 @@ def memory_map(request: Request, agent: AgentDep) -> HTMLResponse:
 
 
 @router.post("/calibrate")
-def calibrate(agent: AgentDep, actor: ConsoleActorDep, percent: Annotated[float | None, Form(ge=0.01, le=50)] = None) -> RedirectResponse:
+def calibrate(
+    agent: AgentDep,
+    actor: ConsoleActorDep,
+    percent: Annotated[float | None, Form(ge=100 * SMALLEST_RATE, le=100 * LARGEST_RATE)] = None,
+) -> RedirectResponse:
     """Keeps a rate; an empty field goes back to the setting's."""
     agent.upkeep.calibrate(None if percent is None else percent / 100, actor=actor)
     return _after(agent, "calibrate")

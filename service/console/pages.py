@@ -13,6 +13,7 @@ from fastapi.exceptions import RequestValidationError
 from fastapi.responses import HTMLResponse, RedirectResponse
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
+from core.calibration import LARGEST_RATE
 from core.errors import OneLookError
 from service.auth import Caller
 from service.console.assets import asset_url
@@ -22,6 +23,7 @@ from service.errors import problem_of, validation_problem
 from service.guarded import Answering, GuardedRoute
 from service.refusals import NoKey
 from service.schemas.problem import Problem
+from service.settings import SMALLEST_RATE
 from store.records import LONGEST_NAME
 
 TEMPLATES = Path(__file__).parent / "templates"
@@ -69,7 +71,14 @@ def _environment() -> Environment:
     environment = Environment(
         loader=FileSystemLoader(TEMPLATES), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
-    environment.globals.update(navigation=NAVIGATION, asset=asset_url, query=query, longest_name=LONGEST_NAME)
+    environment.globals.update(
+        navigation=NAVIGATION,
+        asset=asset_url,
+        query=query,
+        longest_name=LONGEST_NAME,
+        smallest_rate=SMALLEST_RATE,
+        largest_rate=LARGEST_RATE,
+    )
     environment.filters.update(FILTERS)
     return environment
 

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Depends, Query
+from fastapi import APIRouter, Query
 
-from service.deps import AgentDep, Sent, WorkDep, read_sent
+from service.deps import AgentDep, SentDep, WorkDep
 from service.exchange import MemoryRoute
 from service.routes.answers import by_id, goal
-from service.schemas.bursts import burst_or
-from service.schemas.goals import Goal, GoalList, GoalQuery, Plan, PlanQuery, Seen
+from service.schemas.bursts import burst_or_seen
+from service.schemas.goals import Goal, GoalList, GoalQuery, Plan, PlanQuery
 from service.schemas.problem import problems
 
 router = APIRouter(tags=["goals"], route_class=MemoryRoute)
-BODY: dict[str, Any] = burst_or("Seen")
-SentDep = Annotated[Callable[[], Sent], Depends(read_sent(Seen))]
+BODY: dict[str, Any] = burst_or_seen("an observation with a pose, of the goal's category")
 
 
 @router.post(

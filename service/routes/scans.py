@@ -2,25 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Annotated
 
-from fastapi import APIRouter, Depends, Query
+from fastapi import APIRouter, Query
 
-from service.deps import ActorDep, AgentDep, Sent, UploadDep, WorkDep, read_sent
+from service.deps import ActorDep, AgentDep, SentDep, UploadDep, WorkDep
 from service.exchange import MemoryRoute
 from service.routes.answers import by_id, category, scan, scan_answer
-from service.schemas.bursts import BURST_BODY, burst_or
+from service.schemas.bursts import BURST_BODY, burst_or_seen
 from service.schemas.categories import Category
 from service.schemas.problem import problems
-from service.schemas.scans import Scan, ScanBegin, ScanComplete, ScanExclude, ScanList, ScanQuery
+from service.schemas.scans import Scan, ScanComplete, ScanExclude, ScanList, ScanQuery
 
 router = APIRouter(prefix="/v1/scans", tags=["scans"], route_class=MemoryRoute)
 
 
-@router.post("", status_code=201, responses=problems(404, 413, 415, 422, 503), openapi_extra={"requestBody": burst_or("ScanBegin")})
+@router.post(
+    "",
+    status_code=201,
+    responses=problems(404, 413, 415, 422, 503),
+    openapi_extra={"requestBody": burst_or_seen("an observation whose views have cameras and depth")},
+)
 async def begin_scan(
-    read: Annotated[Callable[[], Sent], Depends(read_sent(ScanBegin))],
+    read: SentDep,
     query: Annotated[ScanQuery, Query()],
     agent: AgentDep,
     work: WorkDep,

@@ -109,7 +109,15 @@ BURST_BODY: dict[str, Any] = {"required": True, "content": {"multipart/form-data
 """The `requestBody` of a route that takes a burst."""
 
 
-def burst_or(model: str) -> dict[str, Any]:
-    """The `requestBody` of a route that takes a burst, or JSON of a model that names an earlier observation."""
-    content = BURST_BODY["content"] | {"application/json": {"schema": {"$ref": f"#/components/schemas/{model}"}}}
-    return {"required": True, "content": content}
+class Seen(BaseModel):
+    """An object that was observed before."""
+
+    model_config = ConfigDict(extra="forbid", json_schema_extra={"example": {"observation_id": "9f1c1b8a4b0c4a0fb0a5c0b7f5a0d6c3"}})
+
+    observation_id: str = Field(description="Of a kept observation; the request says what it takes.")
+
+
+def burst_or_seen(observation: str) -> dict[str, Any]:
+    """The `requestBody` of a route that takes a burst, or the id of such an observation."""
+    content = BURST_BODY["content"] | {"application/json": {"schema": {"$ref": "#/components/schemas/Seen"}}}
+    return {"required": True, "description": f"A burst, or as JSON the id of {observation}.", "content": content}

@@ -42,14 +42,6 @@ class PlanQuery(BaseModel):
         return as_up(self.up)
 
 
-class Seen(BaseModel):
-    """An object that was observed before."""
-
-    model_config = ConfigDict(extra="forbid", json_schema_extra={"example": {"observation_id": "9f1c1b8a4b0c4a0fb0a5c0b7f5a0d6c3"}})
-
-    observation_id: str = Field(description="An observation with a pose, of the goal's category.")
-
-
 class Goal(BaseModel):
     """Where an object of a category shall end."""
 

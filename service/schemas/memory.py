@@ -7,10 +7,12 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from core.calibration import LARGEST_RATE
 from service import upkeep
 from service.agent import Agent
 from service.schemas.categories import Category
 from service.schemas.fields import CreatedAt, FalseKnownRate, Score, Threshold
+from service.settings import SMALLEST_RATE
 from store import backup, records
 
 
@@ -56,7 +58,9 @@ class Calibrate(BaseModel):
     model_config = ConfigDict(extra="forbid", json_schema_extra={"example": {"false_known_rate": 0.02}})
 
     false_known_rate: float | None = Field(
-        ge=1e-4, le=0.5, description="Of objects of no known category, the share that may be called known; null: ONELOOK_FALSE_KNOWN_RATE."
+        ge=SMALLEST_RATE,
+        le=LARGEST_RATE,
+        description="Of objects of no known category, the share that may be called known; null: ONELOOK_FALSE_KNOWN_RATE.",
     )
 
 

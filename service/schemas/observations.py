@@ -12,6 +12,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
+from core.calibration import LARGEST_RATE
 from core.novelty import Outcome
 from core.pose import PoseOptions
 from core.sim3 import Sim3
@@ -21,6 +22,7 @@ from service.schemas import scans
 from service.schemas.fields import CreatedAt
 from service.schemas.geometry import Box, Direction, Matrix4, Quaternion, Similarity, Stretch, as_up
 from service.schemas.quality import Grounds
+from service.settings import SMALLEST_RATE
 from store import records
 from store.records import LONGEST_NAME
 
@@ -40,7 +42,10 @@ class ObserveQuery(BaseModel):
     category_id: str | None = Field(None, description="Takes the object for one of this category and skips the decision.")
     threshold: float | None = Field(None, allow_inf_nan=False, description="Least similarity of a known object, for this request.")
     false_known_rate: float | None = Field(
-        None, ge=1e-4, le=0.5, description="Of objects of no known category, the share that may be called known, for this request."
+        None,
+        ge=SMALLEST_RATE,
+        le=LARGEST_RATE,
+        description="Of objects of no known category, the share that may be called known, for this request.",
     )
     looks: int = Field(
         0,

@@ -93,14 +93,6 @@ class ScanList(BaseModel):
     scans: list[Scan]
 
 
-class ScanBegin(BaseModel):
-    """A scan of an object that was observed before."""
-
-    model_config = ConfigDict(extra="forbid", json_schema_extra={"example": {"observation_id": "9f1c1b8a4b0c4a0fb0a5c0b7f5a0d6c3"}})
-
-    observation_id: str = Field(description="An observation whose views have cameras and depth.")
-
-
 class ScanQuery(BaseModel):
     """Query options of a scan."""
 

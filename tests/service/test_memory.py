@@ -9,7 +9,9 @@ from pathlib import Path
 import pytest
 from fastapi.testclient import TestClient
 
+from core.calibration import LARGEST_RATE
 from service.app import create_app
+from service.settings import SMALLEST_RATE
 from store.memory import Memory
 
 ZIP = {"content-type": "application/zip"}
@@ -132,7 +134,7 @@ def test_a_threshold_that_is_set_is_not_made_of_a_rate(settings, backbone, setti
         assert client.post("/v1/memory/calibrate", json={"false_known_rate": 0.1}).status_code == 409
 
 
-@pytest.mark.parametrize("rate", [0, 0.6, "often"])
+@pytest.mark.parametrize("rate", [0, SMALLEST_RATE / 2, LARGEST_RATE + 0.1, "often"])
 def test_a_rate_is_a_share(client, rate):
     answer = client.post("/v1/memory/calibrate", json={"false_known_rate": rate})
     assert (answer.status_code, answer.json()["field"]) == (422, "false_known_rate")

@@ -45,7 +45,8 @@ def test_a_rate_is_set_and_taken_back(client):
     assert client.get("/v1/memory").json()["false_known_rate"] == 0.05
     client.post("/memory/calibrate", data={"percent": ""})
     assert client.get("/v1/memory").json()["false_known_rate"] == 0.01
-    assert client.post("/memory/calibrate", data={"percent": "80"}).status_code == 422
+    assert [client.post("/memory/calibrate", data={"percent": percent}).status_code for percent in ("80", "0.005")] == [422, 422]
+    assert 'min="0.01" max="50"' in client.get("/memory").text
 
 
 def test_a_threshold_that_is_set_has_no_chart(settings, backbone):
