@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from benchmarks.matches import STAGES
 from core.calibration import Prior
-from core.evidence import COHORT, SHORTLIST, cohort_level
+from core.evidence import COHORT, DEVIATIONS, MEMBERS, SHORTLIST, cohort_level
 from core.novelty import VERIFIED
 from core.views import FloatArray
 
@@ -46,10 +46,10 @@ class BestPairs:
         return np.where(np.eye(len(self.agreement), dtype=bool), 1.0, np.nan_to_num(self.agreement))
 
 
-def single_evidence(match: FloatArray, prior: Prior, cohort: int = COHORT) -> FloatArray:
-    """Evidence by tokens of every burst alone for every burst, from their matches, both (N, N)."""
+def single_evidence(match: FloatArray, prior: Prior, deviations: float = DEVIATIONS) -> FloatArray:
+    """Evidence by tokens of every burst alone for every burst, from their matches, both (N, N); all others are the cohort."""
     others = np.where(np.eye(len(match), dtype=bool), -np.inf, match)
-    level = cohort_level(others, prior.cohort, cohort)
+    level = cohort_level(others, prior.usual, deviations)
     return np.asarray(match - (level[:, None] + level[None, :]) / 2)
 
 
@@ -86,9 +86,8 @@ class BestSource:
         stage = int(np.searchsorted(STAGES, len(self._held), side="right")) - 1
         raw = np.where(there, self._best[stage, :, :most, burst], -np.inf)
         shortlist = np.argsort(-raw, axis=1, kind="stable")[:, :SHORTLIST]
-        match = np.take_along_axis(raw, shortlist, axis=1)
-        levels = self._levels(stage, burst, shortlist, there)
-        evidence = np.where(np.isfinite(match), match - levels / 2, -np.inf)
+        there_short = np.isfinite(np.take_along_axis(raw, shortlist, axis=1))
+        evidence = np.where(there_short, self._by_tokens(stage, burst, shortlist, there), -np.inf)
         if self._agreement is not None:
             evidence = evidence + self._verification(burst, shortlist, evidence, verify)
         order = np.argsort(-evidence, axis=1, kind="stable")
@@ -103,19 +102,21 @@ class BestSource:
         if len(rows) and burst not in self._held:
             self._held.append(burst)
 
-    def _levels(self, stage: int, burst: int, shortlist: IntArray, there: NDArray[np.bool_]) -> FloatArray:
-        """What burst and most similar member reach with the founders of other categories, summed, shape (T, S)."""
-        match, founder = self._pairs.match[stage], self._founder[:, : there.shape[1]]
-        held = np.array(self._held, dtype=np.intp)
+    def _by_tokens(self, stage: int, burst: int, shortlist: IntArray, there: NDArray[np.bool_]) -> FloatArray:
+        """See `core.evidence.Comparison`, shape (T, S), of `there`, the categories that count, shape (T, C)."""
+        match, usual, held = self._pairs.match[stage], self._pairs.prior.usual, np.array(self._held, dtype=np.intp)
         if not len(held):
             return np.zeros(shortlist.shape)
-        to_burst = np.where(there, match[founder, burst], -np.inf)
         own = np.where(self._of[:, None, held] == shortlist[:, :, None], match[held, burst], -np.inf)  # (T, S, H)
-        member = held[own.argmax(axis=2)]
-        to_member = np.where(there[:, None], match[founder[:, None], member[:, :, None]], -np.inf)  # (T, S, C)
-        both = np.stack([np.broadcast_to(to_burst[:, None], to_member.shape), to_member])
-        both[:, np.arange(there.shape[1]) == shortlist[:, :, None]] = -np.inf
-        return cohort_level(both, self._pairs.prior.cohort).sum(axis=0)
+        order = np.argsort(-own, axis=2, kind="stable")[:, :, :MEMBERS]
+        own, member = np.take_along_axis(own, order, axis=2), held[order]
+        oldest = min(there.shape[1], COHORT)
+        founder, counts = self._founder[:, :oldest], there[:, None, :oldest] & (np.arange(oldest) != shortlist[:, :, None])
+        of_burst = cohort_level(np.where(counts, match[founder, burst][:, None], -np.inf), usual)
+        of_member = cohort_level(np.where(counts[:, :, None], match[founder[:, None, None], member[..., None]], -np.inf), usual)
+        is_one = np.isfinite(own)
+        evidence = np.where(is_one, np.where(is_one, own, 0) - (of_burst[:, :, None] + of_member) / 2, 0.0)
+        return np.asarray(evidence.sum(axis=2) / np.maximum(is_one.sum(axis=2), 1))
 
     def _verification(self, burst: int, shortlist: IntArray, evidence: FloatArray, verify: IntArray | None) -> FloatArray:
         assert self._agreement is not None

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
@@ -25,12 +26,12 @@ from clients.datasets.folders import find_sequences
 from core.backbones import load_backbone
 from core.calibration import SHIPPED
 from core.encode import Encoder
-from core.evidence import COHORT, cohort_level
+from core.evidence import MEMBERS, Usual, cohort_level
 from core.views import FloatArray
 
 
 def main(data: Annotated[Path, typer.Option(help="folder of bursts")], out: Annotated[Path, typer.Option()] = SHIPPED) -> None:
-    """Writes the usual match with other categories, what an agreement is worth, and samples of evidence for right and wrong categories."""
+    """Writes how bursts match other categories, what an agreement is worth, and samples of evidence for right and wrong categories."""
     backbone = load_backbone(report=typer.echo)
     sequences = find_sequences(data)
     files = encode_all(sequences, Encoder(backbone))
@@ -43,11 +44,12 @@ def main(data: Annotated[Path, typer.Option(help="folder of bursts")], out: Anno
 
 def write(out: Path, fingerprint: str, labels: NDArray[np.intp], match: FloatArray, agreement: FloatArray) -> Path:
     """From the category of each burst, shape (N,), and matches and agreements of all pairs, each (N, N)."""
-    cohort = float(np.mean([_level(match[_founders(labels, x, labels[x]), x]) for x in range(len(labels))]))
+    others = np.concatenate([match[_founders(labels, x, labels[x]), x] for x in range(len(labels))])
+    usual = Usual(round(float(others.mean()), 4), round(float(others.std()), 4))
     wrong: list[list[tuple[float, float]]] = []
     own: list[tuple[float, float]] = []
     for x in range(len(labels)):
-        found = {c: _evidence(match, labels, x, c, cohort) for c in set(labels.tolist()) if _others(labels, x, c)}
+        found = {c: _evidence(match, labels, x, c, usual) for c in set(labels.tolist()) if _others(labels, x, c)}
         founder = {c: agreement[_others(labels, x, c)[0], x] for c in found}
         wrong.append([(found[c], founder[c]) for c in found if c != labels[x]])
         own += [(found[c], founder[c]) for c in found if c == labels[x]]
@@ -60,7 +62,7 @@ def write(out: Path, fingerprint: str, labels: NDArray[np.intp], match: FloatArr
 
     fields = {
         "fingerprint": fingerprint,
-        "cohort": round(cohort, 4),
+        "usual": asdict(usual),
         "agreement_weight": round(weight, 3),
         "tokens": samples(0.0),
         "verified": samples(weight),
@@ -69,12 +71,12 @@ def write(out: Path, fingerprint: str, labels: NDArray[np.intp], match: FloatArr
     return out
 
 
-def _evidence(match: FloatArray, labels: NDArray[np.intp], x: int, category: int, cohort: float) -> float:
+def _evidence(match: FloatArray, labels: NDArray[np.intp], x: int, category: int, usual: Usual) -> float:
     """Of burst x for a category, all bursts but x being in the memory and its own category only where it is the one asked about."""
-    member = max(_others(labels, x, category), key=lambda index: match[index, x])
+    members = sorted(_others(labels, x, category), key=lambda index: -match[index, x])[:MEMBERS]
     founders = [f for f in _founders(labels, x, category) if labels[f] != labels[x]]
-    levels = [cohort_level(match[founders, each], cohort) for each in (x, member)]
-    return float(match[member, x] - (levels[0] + levels[1]) / 2)
+    of_burst, *of_members = (float(cohort_level(match[founders, each], usual)) for each in (x, *members))
+    return float(np.mean([match[member, x] - (of_burst + level) / 2 for member, level in zip(members, of_members)]))
 
 
 def _others(labels: NDArray[np.intp], x: int, category: int) -> list[int]:
@@ -83,10 +85,6 @@ def _others(labels: NDArray[np.intp], x: int, category: int) -> list[int]:
 
 def _founders(labels: NDArray[np.intp], x: int, without: int) -> list[int]:
     return [_others(labels, x, c)[0] for c in sorted(set(labels.tolist())) if c != without and _others(labels, x, c)]
-
-
-def _level(matches: FloatArray) -> float:
-    return float(np.mean(np.sort(matches)[-COHORT:]))
 
 
 def _rounded(values: Sequence[float]) -> list[float]:

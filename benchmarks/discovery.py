@@ -24,7 +24,7 @@ from benchmarks.agreements import agreements
 from benchmarks.best_pairs import BestPairs, BestSource
 from benchmarks.discovery_plot import plot
 from benchmarks.encoded import encode_all, read_views
-from benchmarks.episodes import Counts, SetSource, draw_orders, episode, labels_of
+from benchmarks.episodes import Counts, SetSource, Source, draw_orders, episode, labels_of, nearest_category
 from benchmarks.matches import matches
 from benchmarks.pair_scores import PairScores, auroc, hardest, nearest_accuracy, same_and_other
 from benchmarks.parallel import map_jobs
@@ -58,7 +58,18 @@ TOKENS = "best, tokens alone"
 """`best` as it is without depth."""
 EASIER = "best, one object less"
 """`best` without the object that is hardest to tell from another kind: how much of the error is that one's."""
-SUMMARY = ("score", "auroc", "nearest", "fn_at_zero_fp", "fn_at_one_fp", "default_threshold", "default_fp", "default_fn", "repeat_error")
+SUMMARY = (
+    "score",
+    "auroc",
+    "nearest",
+    "nearest_category",
+    "fn_at_zero_fp",
+    "fn_at_one_fp",
+    "default_threshold",
+    "default_fp",
+    "default_fn",
+    "repeat_error",
+)
 RATE_COLUMNS = (
     "score",
     "asked_percent",
@@ -220,6 +231,7 @@ def score_rows(name: str, pairs: PairScores | BestPairs, labels: NDArray[np.intp
         **curve[at_zero],
         "auroc": auroc(same, other),
         "nearest": nearest_accuracy(single, labels),
+        "nearest_category": nearest_category(source_of(pairs, int(labels.max()) + 1), labels),
         "fn_at_zero_fp": float(fn[at_zero]),
         "fn_at_one_fp": float(fn[at_one]),
         "default_threshold": own,
@@ -272,10 +284,14 @@ def total(parts: Sequence[Total]) -> Total:
     return reduce(operator.add, parts)
 
 
+def source_of(pairs: PairScores | BestPairs, room: int) -> Source:
+    """A memory with room for so many categories."""
+    return BestSource(pairs, room) if isinstance(pairs, BestPairs) else SetSource(pairs, room)
+
+
 def run_episodes(job: Job) -> Counts:
     """The counts of a job's episodes together."""
-    room = len(job.orders[0])
-    source = BestSource(job.pairs, room) if isinstance(job.pairs, BestPairs) else SetSource(job.pairs, room)
+    source = source_of(job.pairs, len(job.orders[0]))
     return total([episode(source, job.labels, order, job.thresholds) for order in job.orders])
 
 

@@ -163,6 +163,22 @@ def episode(source: Source, labels: NDArray[np.intp], order: Sequence[int], thre
     return Counts(wrong_sum[None], missed_sum[None], one[0], one[1], repeat_sum[None], one[2], categories, truth)
 
 
+def nearest_category(source: Source, labels: NDArray[np.intp]) -> float:
+    """Share of bursts whose most similar category is theirs, in a memory that holds all other bursts, each in its true category.
+
+    Bursts that are the only ones of their kind are not asked. `labels`: as of `episode`.
+    """
+    asked = np.flatnonzero(np.bincount(labels)[labels] > 1)
+    right = 0
+    for burst in asked:
+        source.begin(1)
+        for other in np.flatnonzero(np.arange(len(labels)) != burst):
+            source.learn(int(other), labels[[other]], np.array([0]))
+        chosen, _ = source.nearest(int(burst), labels.max(keepdims=True) + 1)
+        right += int(chosen[0] == labels[burst])
+    return right / len(asked)
+
+
 def labels_of(sequences: Sequence[folders.Sequence]) -> NDArray[np.intp]:
     """The true category of each burst as a number from 0 on, shape (N,)."""
     return np.unique([sequence.category for sequence in sequences], return_inverse=True)[1]

@@ -25,7 +25,7 @@ from core.backbones import load_backbone
 from core.backbones.whitening import Whitening
 from core.calibration import Prior
 from core.encode import Encoder
-from core.evidence import COHORT, PATCHES, sample_patches, whitened
+from core.evidence import DEVIATIONS, PATCHES, sample_patches, whitened
 from core.views import FloatArray
 
 COLUMNS = ("change", "auroc", "nearest")
@@ -39,7 +39,7 @@ class Choice:
     """Of a view."""
     adapted: int = STAGES[-1]
     """Objects, drawn at random, that the statistics adapt to."""
-    cohort: int = COHORT
+    deviations: float = DEVIATIONS
 
 
 @dataclass(frozen=True)
@@ -61,11 +61,11 @@ def main(
     files = tuple(encode_all(sequences, Encoder(backbone)))
     labels = labels_of(sequences)
     choices = varied(len(files))
-    tables = dict.fromkeys(replace(choice, cohort=COHORT) for choice in choices.values())
+    tables = dict.fromkeys(replace(choice, deviations=DEVIATIONS) for choice in choices.values())
     matches = dict(
         zip(tables, map_jobs(table, [Job(files, backbone.whitening, choice) for choice in tables], lambda job: 1, "matching patches"))
     )
-    rows = [row(name, matches[replace(choice, cohort=COHORT)], choice.cohort, labels) for name, choice in choices.items()]
+    rows = [row(name, matches[replace(choice, deviations=DEVIATIONS)], choice.deviations, labels) for name, choice in choices.items()]
     if json is not None:
         write_json(json, {"benchmark": "evidence_ablation", "data": data, "sequences": len(files)}, rows)
     print_table(f"Evidence, {data}", rows, COLUMNS)
@@ -78,7 +78,7 @@ def varied(objects: int) -> dict[str, Choice]:
         "today's": today,
         **{f"patches of a view: {count}": replace(today, patches=count) for count in (12, 48, 96)},
         **{f"statistics of objects: {count}": replace(today, adapted=count) for count in (0, 8, objects)},
-        **{f"cohort: {count}": replace(today, cohort=count) for count in (1, 3, 10)},
+        **{f"deviations: {each}": replace(today, deviations=each) for each in (0.0, 1.0, 2.0, 4.0)},
     }
 
 
@@ -88,9 +88,9 @@ def table(job: Job) -> FloatArray:
     return match_table(patches, adapted(patches, job.choice.adapted))
 
 
-def row(name: str, matches: FloatArray, cohort: int, labels: NDArray[np.intp]) -> Row:
+def row(name: str, matches: FloatArray, deviations: float, labels: NDArray[np.intp]) -> Row:
     """One line of the table, from matches of all pairs, shape (N, N), and the category of each burst, shape (N,)."""
-    single = single_evidence(matches, Prior.shipped(), cohort)
+    single = single_evidence(matches, Prior.shipped(), deviations)
     return dict(zip(COLUMNS, (name, auroc(*same_and_other(single, labels)), nearest_accuracy(single, labels))))
 
 

@@ -20,6 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
+from core.evidence import Usual
+
 FloatArray = NDArray[np.floating]
 
 SHIPPED = Path(__file__).parent / "backbones" / "statistics" / "decision.json"
@@ -53,8 +55,7 @@ class Prior:
 
     fingerprint: str
     """Of the backbone it was measured with; with another one it is a start, and no more."""
-    cohort: float
-    """Usual match of a burst with the most similar of other categories."""
+    usual: Usual
     agreement_weight: float
     """Evidence a unit of agreement of a pose is worth: such that both vary as much among wrong categories."""
     tokens: Samples
@@ -70,7 +71,7 @@ class Prior:
         """The estimate that comes with OneLook."""
         fields = json.loads(SHIPPED.read_text())
         kinds = {kind: Samples(tuple(fields[kind]["rivals"]), tuple(fields[kind]["own"])) for kind in ("tokens", "verified")}
-        return Prior(fields["fingerprint"], fields["cohort"], fields["agreement_weight"], kinds["tokens"], kinds["verified"])
+        return Prior(fields["fingerprint"], Usual(**fields["usual"]), fields["agreement_weight"], kinds["tokens"], kinds["verified"])
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 Up to EXACT members each is compared patch by patch, which is the rule (`core.evidence.Comparison.between`); what does not depend on the
 burst is computed once. Of a larger memory the burst is compared with the mean pooled token of every member first, and patch by patch with
-the nearest members and the founders of the nearest categories alone; a member's cohort is made of the founders nearest to it.
+the nearest members, the founders of the nearest categories and the cohort alone.
 
 Letters: V views, K patches a view, D token size.
 """
@@ -12,6 +12,7 @@ from __future__ import annotations
 import threading
 from collections import OrderedDict
 from collections.abc import Mapping, Sequence
+from itertools import islice
 from typing import Protocol, TypeVar
 
 import numpy as np
@@ -20,7 +21,7 @@ from torch import Tensor
 
 from core.backbones.whitening import Whitening
 from core.encode import EncodedBurst
-from core.evidence import Adaptation, Comparison, best_matching, match_views, sample_patches, whitened
+from core.evidence import COHORT, Adaptation, Comparison, Usual, match_views, sample_patches, whitened
 from core.nearness import Listed, Nearness
 from core.views import FloatArray
 
@@ -29,7 +30,7 @@ T = TypeVar("T")
 EXACT = 64
 """Members up to which every one is compared patch by patch: about 25 ms on two cores with ten views a side."""
 NEAREST = 12
-"""Members, and founders of categories, that are compared patch by patch in a larger memory."""
+"""Members, and founders of categories, that are compared patch by patch in a larger memory, beside the cohort."""
 ADAPTED_FROM = 256
 """Members, evenly spaced, whose patches a larger memory is adapted to; more say nothing new."""
 GROWTH = 1.25
@@ -68,16 +69,14 @@ class Enrolled:
         self._patches: _Latest[Tensor] = _Latest(KEPT)
         self._cohorts: _Latest[dict[str, float]] = _Latest(KEPT_COHORTS)
         """By member, its matches with founders, by the founder's id."""
-        self._neighbours: dict[int, list[int]] = {}
-        """By member, the founders that its cohort is made of; while nothing changes."""
 
-    def compare(self, target: EncodedBurst, prior: float) -> Comparison | None:
-        """A burst with all members, or the nearest; None where there is none. `prior` as of `Comparison`."""
+    def compare(self, target: EncodedBurst, usual: Usual) -> Comparison | None:
+        """A burst with all members, or the nearest; None where there is none. `usual` as of `Comparison`."""
         with self._lock:
             self._update(self._source.listed())
             while len(self._near):
                 try:
-                    return self._compare(target, prior)
+                    return self._compare(target, usual)
                 except _DamagedError as error:
                     self._left_out |= error.ids
                     self._enrol()
@@ -95,53 +94,37 @@ class Enrolled:
 
     def _enrol(self) -> None:
         self._near.update([member for member in self._listed if member.id not in self._left_out], self._source.pooled_means)
-        self._neighbours.clear()
 
-    def _compare(self, target: EncodedBurst, prior: float) -> Comparison:
+    def _compare(self, target: EncodedBurst, usual: Usual) -> Comparison:
         self._adapt()
-        near, members = self._near, self._near.members
+        near = self._near
+        founders = dict(islice(near.founders.items(), COHORT))
         if self.exact:
             chosen = list(range(len(near)))
         else:
-            ((closest, founders),) = near.nearest(target.pooled.mean(axis=0)[None], NEAREST)
-            chosen = sorted({*closest, *founders})
+            ((closest, of_near),) = near.nearest(target.pooled.mean(axis=0)[None], NEAREST)
+            chosen = sorted({*closest, *of_near, *founders.values()})
         found = match_views(self._directions([sample_patches(target)])[0], self._prepared(chosen))
-        best: dict[str, int] = {}
-        matches: dict[str, float] = {}
-        of_founders: dict[str, float] = {}
-        for place, match in zip(chosen, found.tolist()):
-            category = members[place].category_id
-            if match > matches.get(category, -np.inf):
-                matches[category], best[category] = match, place
-            if near.founders[category] == place:
-                of_founders[category] = match
-        asked = best_matching(matches)
-        cohorts = dict(zip(asked, self._cohorts_of([best[category] for category in asked])))
-        return Comparison(matches, of_founders, cohorts, prior)
+        matches = dict(zip(chosen, found.tolist()))
+        return Comparison.of(
+            [near.members[place].category_id for place in chosen],
+            found,
+            lambda index: self._cohort_of(chosen[index], founders),
+            {category: matches[place] for category, place in founders.items()},
+            usual,
+        )
 
-    def _cohorts_of(self, places: Sequence[int]) -> list[dict[str, float]]:
-        """For each of some members its matches with founders, by category. Founders are compared once; their patches are not kept."""
-        members, near = self._near.members, self._founders_near(places)
-        known = [self._cohorts.keep(members[place].id, self._cohorts.get(members[place].id, {})) for place in places]
-        missing = [[each for each in founders if members[each].id not in of_one] for founders, of_one in zip(near, known)]
-        wanted = sorted({each for some in missing for each in some})
-        patches = dict(zip(wanted, self._prepared(wanted, keep=False)))
-        for place, of_one, some in zip(places, known, missing):
-            if some:
-                matches = match_views(self._prepared([place])[0], [patches[each] for each in some])
-                of_one.update(zip((members[each].id for each in some), matches.tolist()))
-        return [{members[each].category_id: of_one[members[each].id] for each in founders} for founders, of_one in zip(near, known)]
-
-    def _founders_near(self, places: Sequence[int]) -> list[list[int]]:
-        if self.exact:
-            return [list(self._near.founders.values())] * len(places)
-        missing = [place for place in places if place not in self._neighbours]
+    def _cohort_of(self, place: int, founders: Mapping[str, int]) -> dict[str, float]:
+        """A member's matches with the founders, by category; each is compared once."""
+        members = self._near.members
+        known = self._cohorts.keep(members[place].id, self._cohorts.get(members[place].id, {}))
+        missing = [each for each in founders.values() if members[each].id not in known]
         if missing:
-            found = self._near.nearest(self._near.vectors(missing), NEAREST + 1)
-            self._neighbours.update(zip(missing, (founders for _, founders in found)))
-        return [self._neighbours[place] for place in places]
+            matches = match_views(self._prepared([place])[0], self._prepared(missing))
+            known.update(zip((members[each].id for each in missing), matches.tolist()))
+        return {category: known[members[each].id] for category, each in founders.items()}
 
-    def _prepared(self, places: Sequence[int], *, keep: bool = True) -> list[Tensor]:
+    def _prepared(self, places: Sequence[int]) -> list[Tensor]:
         """Unit patches of some members, adapted to the memory. Raises _DamagedError."""
         ids = [self._near.members[place].id for place in places]
         there = {each: self._patches[each] for each in ids if each in self._patches}
@@ -149,9 +132,8 @@ class Enrolled:
         if missing:
             read = self._read(missing)
             there.update(zip(missing, self._directions([read[each] for each in missing])))
-        if keep:
-            for each in ids:
-                self._patches.keep(each, there[each])
+        for each in ids:
+            self._patches.keep(each, there[each])
         return [there[each] for each in ids]
 
     def _read(self, ids: Sequence[str]) -> Mapping[str, FloatArray]:

@@ -3,16 +3,18 @@
 Three things beyond the paper's cosines of [CLS]:
 - patches of the block that serves correspondences, whitened by what ships and then by what this memory has seen;
 - every view counts by the other side's view it matches best, since opposite sides of one object look unalike;
-- from a match is taken what burst and member reach with other categories: some objects resemble everything (hubs), and a burst of many
-  views finds a good match for each of them. What is left does not grow with the number of views.
+- a match counts by how far it exceeds what burst and member reach with other categories: some objects resemble everything (hubs), some
+  everything a little and some nothing, and a burst of many views finds a good match for each of them. What is left grows neither with the
+  number of views nor with that of categories. (Speaker recognition normalises scores by a cohort in this way.)
 
 Letters: V, W views, K patches a view, D token size, C categories.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 import torch
@@ -26,8 +28,14 @@ FloatArray = NDArray[np.floating]
 
 PATCHES = 24
 """Patches kept of each view, drawn at random: the figures of 12 and of 48 differ by less than a hundredth."""
-COHORT = 5
-"""Other categories that tell how well a burst matches anything: the most similar ones."""
+COHORT = 32
+"""Other categories that tell how well a burst matches anything: the oldest, so that they stay the same while a memory grows."""
+COHORT_PRIOR = 3.0
+"""Categories for which the shipped usual match counts beside those of the memory."""
+DEVIATIONS = 3.0
+"""Standard deviations above the mean of matches with other categories from which on a match speaks for its category."""
+MEMBERS = 2
+"""Members of a category, the best matching ones, whose evidence is averaged: one alone may match by chance."""
 SHORTLIST = 5
 """Categories, the best matching first, whose evidence is computed."""
 ADAPTATION_PRIOR = 4.0
@@ -105,15 +113,21 @@ def match_views(target: Tensor, others: Sequence[Tensor]) -> FloatArray:
     return np.array(found)
 
 
-def cohort_level(matches: FloatArray, prior: float, cohort: int = COHORT) -> FloatArray:
-    """Mean of the `cohort` best of the matches with other categories, shape (*) from (*, C).
+@dataclass(frozen=True)
+class Usual:
+    """Matches of a burst with categories that it is not of, before anything is known of them."""
 
-    −inf stands for no category; what is missing to `cohort` counts as `prior`.
-    """
-    count = matches.shape[-1]
-    best = np.partition(matches, count - cohort, axis=-1)[..., -cohort:] if count > cohort else matches
-    there = best > -np.inf
-    return np.asarray((np.where(there, best, prior).sum(axis=-1) + prior * max(cohort - count, 0)) / cohort)
+    mean: float
+    deviation: float
+
+
+def cohort_level(matches: FloatArray, usual: Usual, deviations: float = DEVIATIONS) -> FloatArray:
+    """DEVIATIONS above the mean of matches with other categories, shape (*) from (*, C); −inf stands for no category."""
+    there = matches > -np.inf
+    count = there.sum(axis=-1) + COHORT_PRIOR
+    mean = (np.where(there, matches, 0.0).sum(axis=-1) + COHORT_PRIOR * usual.mean) / count
+    squares = np.where(there, matches - mean[..., None], 0.0) ** 2
+    return np.asarray(mean + deviations * np.sqrt((squares.sum(axis=-1) + COHORT_PRIOR * usual.deviation**2) / count))
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,6 +139,15 @@ class Entry:
     """Unit patches, adapted to the memory, shape (V, K, D)."""
 
 
+@dataclass(frozen=True)
+class Matched:
+    """A member that a burst was matched with."""
+
+    match: float
+    cohort: Mapping[str, float]
+    """The member's own matches with the founders of COHORT categories, by category."""
+
+
 @dataclass(frozen=True, eq=False)
 class Comparison:
     """One burst against the categories of a memory, or the nearest of them.
@@ -132,50 +155,72 @@ class Comparison:
     A category's first member, its founder, represents it to others.
     """
 
-    matches: Mapping[str, float]
-    """By category, of the burst with the member it matches best."""
-    founders: Mapping[str, float]
-    """By category, of the burst with the founder."""
-    cohorts: Mapping[str, Mapping[str, float]]
-    """By category, for those of `best_matching` at least: of the best matching member with the founders of the other categories."""
-    prior: float
-    """Usual match with the most similar of other categories."""
+    matched: Mapping[str, Sequence[Matched]]
+    """By category, best matching first: up to MEMBERS of its members, the best matching ones. SHORTLIST categories and one more: one may
+    be left out."""
+    cohort: Mapping[str, float]
+    """Of the burst with the founders of COHORT categories, by category."""
+    usual: Usual
 
     @staticmethod
-    def between(target: Tensor, entries: Sequence[Entry], prior: float) -> Comparison:
+    def between(target: Tensor, entries: Sequence[Entry], usual: Usual) -> Comparison:
         """With every member, oldest first, patch by patch: the rule that `core.enrolled` keeps to.
 
         `target`: unit patches, adapted to the same memory, shape (V, K, D).
         """
         found = match_views(target, [entry.patches for entry in entries])
-        best: dict[str, int] = {}
-        founders: dict[str, int] = {}
-        for index, entry in enumerate(entries):
-            founders.setdefault(entry.category_id, index)
-            if found[index] > found[best.setdefault(entry.category_id, index)]:
-                best[entry.category_id] = index
-        matches = {category: float(found[index]) for category, index in best.items()}
+        founders = cohort_of([entry.category_id for entry in entries])
         of_founders = [entries[index].patches for index in founders.values()]
-        cohorts = {
-            category: dict(zip(founders, match_views(entries[best[category]].patches, of_founders).tolist()))
-            for category in best_matching(matches)
-        }
-        return Comparison(matches, {category: float(found[index]) for category, index in founders.items()}, cohorts, prior)
+
+        def own_cohort(place: int) -> dict[str, float]:
+            return dict(zip(founders, match_views(entries[place].patches, of_founders).tolist()))
+
+        cohort = {category: float(found[place]) for category, place in founders.items()}
+        return Comparison.of([entry.category_id for entry in entries], found, own_cohort, cohort, usual)
+
+    @staticmethod
+    def of(
+        categories: Sequence[str],
+        matches: FloatArray,
+        own_cohort: Callable[[int], Mapping[str, float]],
+        cohort: Mapping[str, float],
+        usual: Usual,
+    ) -> Comparison:
+        """From the matches with members of these categories, shape (number of members,); `own_cohort` gives a member's, by its place."""
+        best = best_members(categories, matches)
+        matched = {category: [Matched(float(matches[place]), own_cohort(place)) for place in places] for category, places in best.items()}
+        return Comparison(matched, cohort, usual)
 
     def ranked(self, without: str | None = None) -> list[tuple[str, float]]:
         """(category, evidence) of the SHORTLIST best matching categories, most evidence first; as if `without` were not in the memory."""
-        shortlist = [category for category in best_matching(self.matches) if category != without][:SHORTLIST]
+        shortlist = [category for category in self.matched if category != without][:SHORTLIST]
         evidence = {category: self._evidence(category, {category, without}) for category in shortlist}
         return sorted(evidence.items(), key=lambda entry: (-entry[1], entry[0]))
 
     def _evidence(self, category: str, left_out: Collection[str | None]) -> float:
-        of_burst, of_member = (
-            cohort_level(np.array([match for other, match in found.items() if other not in left_out]), self.prior)
-            for found in (self.founders, self.cohorts[category])
+        members = self.matched[category]
+        of_burst, *of_members = (
+            cohort_level(np.array([match for other, match in found.items() if other not in left_out]), self.usual)
+            for found in (self.cohort, *(member.cohort for member in members))
         )
-        return float(self.matches[category] - (of_burst + of_member) / 2)
+        return float(np.mean([member.match - (of_burst + level) / 2 for member, level in zip(members, of_members)]))
 
 
-def best_matching(matches: Mapping[str, float]) -> list[str]:
-    """The SHORTLIST best matching categories and one more, best first: one may be left out."""
-    return sorted(matches, key=lambda category: -matches[category])[: SHORTLIST + 1]
+def cohort_of(categories: Sequence[str]) -> dict[str, int]:
+    """The founders of the COHORT oldest categories, by category: places among members, whose categories these are, oldest first."""
+    founders: dict[str, int] = {}
+    for place, category in enumerate(categories):
+        founders.setdefault(category, place)
+    return dict(islice(founders.items(), COHORT))
+
+
+def best_members(categories: Sequence[str], matches: FloatArray) -> dict[str, list[int]]:
+    """By category, best matching first and SHORTLIST + 1 of them, its MEMBERS best matching members: places among members of these
+    categories and with these matches, shape (number of members,)."""
+    best: dict[str, list[int]] = {}
+    for place in np.argsort(-matches, kind="stable").tolist():
+        if categories[place] in best or len(best) <= SHORTLIST:
+            places = best.setdefault(categories[place], [])
+            if len(places) < MEMBERS:
+                places.append(place)
+    return best

@@ -16,7 +16,7 @@ from core.calibration import LARGEST_RATE, Calibration, Levels, Prior
 from core.encode import EncodedBurst
 from core.enrolled import Enrolled
 from core.errors import InvalidInput
-from core.evidence import Adaptation, Comparison, Entry, sample_patches, whitened
+from core.evidence import Adaptation, Comparison, Entry, Usual, sample_patches, whitened
 from core.scores import BEST, DEFAULT_SCORE, SCORES, require_score
 from core.views import FloatArray
 
@@ -148,7 +148,7 @@ def decide(
 
 def _by_evidence(memory: Sequence[Member] | Enrolled, target: EncodedBurst, config: DecisionConfig, context: Context) -> Decision:
     prior, verified = Prior.shipped(), context.verify is not None
-    comparison = _compare(memory, target, context.whitening, prior.cohort)
+    comparison = _compare(memory, target, context.whitening, prior.usual)
     evidence = comparison.ranked() if comparison else []
     agreements = {category: context.verify(category) for category, _ in evidence[:VERIFIED]} if context.verify else {}
 
@@ -177,12 +177,12 @@ def _by_evidence(memory: Sequence[Member] | Enrolled, target: EncodedBurst, conf
     )
 
 
-def _compare(memory: Sequence[Member] | Enrolled, target: EncodedBurst, whitening: Whitening | None, prior: float) -> Comparison | None:
+def _compare(memory: Sequence[Member] | Enrolled, target: EncodedBurst, whitening: Whitening | None, usual: Usual) -> Comparison | None:
     if isinstance(memory, Enrolled):
-        return memory.compare(target, prior)
+        return memory.compare(target, usual)
     members = [(member.category_id, whitened(member.patches, whitening)) for member in memory if member.patches is not None]
     if not members:
         return None
     adaptation = Adaptation.fit([patches for _, patches in members])
     entries = [Entry(category_id, adaptation.directions(patches)) for category_id, patches in members]
-    return Comparison.between(adaptation.directions(whitened(sample_patches(target), whitening)), entries, prior)
+    return Comparison.between(adaptation.directions(whitened(sample_patches(target), whitening)), entries, usual)

@@ -115,9 +115,11 @@ def _measure(probe: Probe) -> GrowthRow:
 
 def _exact(memory: Memory, probe: Probe, whitening: Any) -> list[tuple[str, float]]:
     """The most similar category and its similarity, with every member compared patch by patch."""
+    import numpy as np
+
     from core.calibration import Prior
     from core.enrolled import adapted_from
-    from core.evidence import Adaptation, Comparison, best_matching, match_views, sample_patches, whitened
+    from core.evidence import Adaptation, Comparison, cohort_of, match_views, sample_patches, whitened
 
     members = memory.instances.listed()
     sample = [members[place].id for place in adapted_from(len(members))]
@@ -125,23 +127,29 @@ def _exact(memory: Memory, probe: Probe, whitening: Any) -> list[tuple[str, floa
     adaptation = Adaptation.fit([whitened(read[each], whitening) for each in sample])
     targets = [adaptation.directions(whitened(sample_patches(burst), whitening)) for burst in probe.known]
 
-    def with_all(asked: Sequence[Any]) -> list[dict[str, float]]:
-        found: list[dict[str, float]] = [{} for _ in asked]
+    def with_all(asked: Sequence[Any]) -> list[Any]:
+        found: list[list[Any]] = [[] for _ in asked]
         for start in range(0, len(members), AT_ONCE):
-            part = members[start : start + AT_ONCE]
-            patches = memory.instances.patches([each.id for each in part])
-            directions = [adaptation.directions(whitened(patches[each.id], whitening)) for each in part]
+            part = [member.id for member in members[start : start + AT_ONCE]]
+            patches = memory.instances.patches(part)
+            directions = [adaptation.directions(whitened(patches[each], whitening)) for each in part]
             for each, matches in zip(asked, found):
-                matches.update(zip((member.category_id for member in part), match_views(each, directions).tolist()))
-        return found
+                matches.append(match_views(each, directions))
+        return [np.concatenate(matches) for matches in found]
 
-    own = {member.category_id: member.id for member in members}
-    matched = with_all(targets)
-    wanted = sorted({category for matches in matched for category in best_matching(matches)})
-    patches = memory.instances.patches([own[category] for category in wanted])
-    between = with_all([adaptation.directions(whitened(patches[own[category]], whitening)) for category in wanted])
-    cohorts = dict(zip(wanted, between))
-    return [Comparison(matches, matches, cohorts, Prior.shipped().cohort).ranked()[0] for matches in matched]
+    def own_cohort(place: int) -> dict[str, float]:
+        patches = memory.instances.patches([members[place].id, *(members[each].id for each in founders.values())])
+        own, *others = (adaptation.directions(whitened(each, whitening)) for each in patches.values())
+        return dict(zip(founders, match_views(own, others).tolist()))
+
+    categories = [member.category_id for member in members]
+    founders = cohort_of(categories)
+    return [
+        Comparison.of(
+            categories, found, own_cohort, {category: float(found[place]) for category, place in founders.items()}, Prior.shipped().usual
+        ).ranked()[0]
+        for found in with_all(targets)
+    ]
 
 
 def _nearness(memory: Memory) -> Any:

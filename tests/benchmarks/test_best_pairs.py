@@ -10,9 +10,9 @@ from benchmarks import calibrated
 from benchmarks.best_pairs import BestPairs, BestSource
 from benchmarks.matches import STAGES
 from core.calibration import Prior, Samples
-from core.evidence import Comparison, Entry, match_views
+from core.evidence import Comparison, Entry, Usual, match_views
 
-PRIOR = Prior("any", 0.2, 0.5, Samples((0.05, 0.1, 0.15), (0.5,)), Samples((0.1, 0.2, 0.3), (0.9,)))
+PRIOR = Prior("any", Usual(0.2, 0.05), 0.5, Samples((0.05, 0.1, 0.15), (0.5,)), Samples((0.1, 0.2, 0.3), (0.9,)))
 LABELS = np.repeat(np.arange(6), 3)
 CHOSEN = [0, 0, 1, 2, 2, 3, 1, 4, 5, 6, 6]
 """The category that each of the first bursts joined, in the order in which they came."""
@@ -51,7 +51,7 @@ def test_evidence_is_the_service_s(pairs: BestPairs, patches: list[torch.Tensor]
     used = filled(source)
     categories, evidence = source.ranked(target, used, np.array([without]))
     entries = [Entry(str(category), patches[burst]) for burst, category in enumerate(CHOSEN)]
-    expected = Comparison.between(patches[target], entries, PRIOR.cohort).ranked(str(without) if without >= 0 else None)
+    expected = Comparison.between(patches[target], entries, PRIOR.usual).ranked(str(without) if without >= 0 else None)
     assert [str(each) for each in categories[0]] == [category for category, _ in expected]
     np.testing.assert_allclose(evidence[0], [value for _, value in expected], atol=1e-5)
 

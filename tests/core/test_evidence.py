@@ -7,11 +7,24 @@ import pytest
 import torch
 
 from core.descriptors import unit
-from core.evidence import ADAPTATION_PRIOR, COHORT, Adaptation, Comparison, Entry, cohort_level, match_views, sample_patches
+from core.evidence import (
+    ADAPTATION_PRIOR,
+    COHORT,
+    COHORT_PRIOR,
+    DEVIATIONS,
+    Adaptation,
+    Comparison,
+    Entry,
+    Usual,
+    cohort_level,
+    match_views,
+    sample_patches,
+)
 
 from .conftest import PaintedObject
 
 AXES = torch.eye(6)
+USUAL = Usual(0.2, 0.05)
 
 
 def views(*patches: list[int]) -> torch.Tensor:
@@ -34,11 +47,33 @@ def test_many_bursts_are_matched_as_one_after_the_other() -> None:
     np.testing.assert_allclose(together, [match_views(other, [others[0]])[0] for other in others], atol=1e-6)
 
 
-def test_the_cohort_is_the_best_of_the_others_and_filled_by_the_prior() -> None:
-    assert cohort_level(np.arange(10.0), 0.0) == pytest.approx(np.mean(np.arange(10 - COHORT, 10)))
-    assert cohort_level(np.array([1.0]), 0.5) == pytest.approx((1 + 0.5 * (COHORT - 1)) / COHORT)
-    assert cohort_level(np.array([1.0, -np.inf]), 0.5) == cohort_level(np.array([1.0]), 0.5)
-    assert cohort_level(np.zeros((3, 0)), 0.5).tolist() == [0.5] * 3
+def test_a_match_speaks_above_the_mean_and_deviations_of_the_cohort_beside_what_ships() -> None:
+    usual = Usual(0.5, 0.1)
+    assert cohort_level(np.zeros((3, 0)), usual).tolist() == pytest.approx([0.5 + DEVIATIONS * 0.1] * 3)
+    assert cohort_level(np.array([0.6, 0.4, -np.inf]), usual) == pytest.approx(0.5 + DEVIATIONS * 0.1)
+    many = np.random.default_rng(0).normal(0.2, 0.03, size=4000)
+    assert cohort_level(many, usual) == pytest.approx(0.2 + DEVIATIONS * 0.03, abs=0.01)
+    one = (1 + COHORT_PRIOR * 0.5) / (1 + COHORT_PRIOR)
+    assert cohort_level(np.array([1.0]), usual, deviations=0) == pytest.approx(one)
+
+
+def test_only_the_oldest_categories_are_the_cohort() -> None:
+    """Whatever the rest are, the evidence is the same."""
+    generator = torch.Generator().manual_seed(0)
+    patches = [torch.nn.functional.normalize(torch.randn(2, 3, 6, generator=generator), dim=-1) for _ in range(COHORT + 20)]
+    entries = [Entry(f"{index}", each) for index, each in enumerate(patches)]
+    far = [Entry(entry.category_id, -patches[0][:1, :1]) for entry in entries[COHORT:]]
+    asked = patches[3] + 0.01
+    found = [dict(Comparison.between(asked, entries[:COHORT] + rest, USUAL).ranked())["3"] for rest in ([], far, entries[COHORT:])]
+    assert found[1:] == pytest.approx([found[0]] * 2)
+
+
+def test_two_members_that_match_say_more_than_one_by_chance() -> None:
+    asked = views([0, 1, 2, 3])
+    chance = [Entry("chance", views([0, 1, 2, 3])), Entry("chance", views([4, 5, 4, 5]))]
+    like = [Entry("like", views([0, 1, 2, 4]))] * 2
+    ranked = Comparison.between(asked, [*chance, *like, Entry("other", views([5, 5, 5, 5]))], USUAL).ranked()
+    assert ranked[0][0] == "like"
 
 
 def test_the_mean_is_shrunk_towards_what_ships() -> None:
@@ -63,7 +98,7 @@ def test_what_resembles_everything_is_no_evidence() -> None:
     """A hub matches the burst best of all, but matches every other category as well."""
     everything = views([0, 1, 2, 3, 4, 5])
     entries = [Entry("hub", everything), *(Entry(f"{axis}", views([axis] * 6)) for axis in range(6))]
-    ranked = Comparison.between(views([0, 0, 0, 0, 0, 1]), entries, 0.0).ranked()
+    ranked = Comparison.between(views([0, 0, 0, 0, 0, 1]), entries, USUAL).ranked()
     assert ranked[0][0] == "0"
     assert dict(ranked)["0"] > dict(ranked)["hub"]
 
@@ -71,7 +106,7 @@ def test_what_resembles_everything_is_no_evidence() -> None:
 def test_a_category_left_out_is_as_if_it_were_not_there() -> None:
     entries = [Entry(f"{axis}", views([axis, (axis + 1) % 6])) for axis in range(4)]
     asked = views([0, 1])
-    assert Comparison.between(asked, entries, 0.2).ranked(without="0") == Comparison.between(asked, entries[1:], 0.2).ranked()
+    assert Comparison.between(asked, entries, USUAL).ranked(without="0") == Comparison.between(asked, entries[1:], USUAL).ranked()
 
 
 def test_patches_are_drawn_the_same_way_every_time_from_views_that_show_something(painted: PaintedObject) -> None:
