@@ -23,6 +23,8 @@ from core.views import FloatArray
 
 MOST_CATEGORIES, MOST_SEQUENCES = 20, 10
 """The paper's episodes: 10 sequences of each of 20 categories, where there are as many."""
+ORDERS = 5
+"""Of a memory that holds all other bursts."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,17 +168,19 @@ def episode(source: Source, labels: NDArray[np.intp], order: Sequence[int], thre
 def nearest_category(source: Source, labels: NDArray[np.intp]) -> float:
     """Share of bursts whose most similar category is theirs, in a memory that holds all other bursts, each in its true category.
 
-    Bursts that are the only ones of their kind are not asked. `labels`: as of `episode`.
+    Mean over ORDERS random orders in which these came: the first of a category founds it. Bursts that are the only ones of their kind
+    are not asked. `labels`: as of `episode`.
     """
+    rng = np.random.default_rng(0)
     asked = np.flatnonzero(np.bincount(labels)[labels] > 1)
     right = 0
-    for burst in asked:
+    for burst in np.tile(asked, ORDERS):
         source.begin(1)
-        for other in np.flatnonzero(np.arange(len(labels)) != burst):
+        for other in rng.permutation(np.delete(np.arange(len(labels)), burst)):
             source.learn(int(other), labels[[other]], np.array([0]))
         chosen, _ = source.nearest(int(burst), labels.max(keepdims=True) + 1)
         right += int(chosen[0] == labels[burst])
-    return right / len(asked)
+    return right / (ORDERS * len(asked))
 
 
 def labels_of(sequences: Sequence[folders.Sequence]) -> NDArray[np.intp]:

@@ -12,7 +12,7 @@ from benchmarks.matches import STAGES
 from core.calibration import Prior, Samples
 from core.evidence import Comparison, Entry, Usual, match_views
 
-PRIOR = Prior("any", Usual(0.2, 0.05), 0.5, Samples((0.05, 0.1, 0.15), (0.5,)), Samples((0.1, 0.2, 0.3), (0.9,)))
+PRIOR = Prior("any", Usual(0.2, 0.05), 0.5, Samples((-0.2, -0.1, 0.0), (0.2,)), Samples((-0.1, 0.0, 0.1), (0.4,)))
 LABELS = np.repeat(np.arange(6), 3)
 CHOSEN = [0, 0, 1, 2, 2, 3, 1, 4, 5, 6, 6]
 """The category that each of the first bursts joined, in the order in which they came."""

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks.discovery import score_rows
-from benchmarks.episodes import MOST_SEQUENCES, Counts, SetSource, draw_orders
+from benchmarks.episodes import MOST_SEQUENCES, Counts, SetSource, draw_orders, nearest_category
 from benchmarks.episodes import episode as run_episode
 from benchmarks.pair_scores import PairScores
 
@@ -46,6 +46,16 @@ def test_a_category_is_compared_by_the_mean_over_its_members() -> None:
     # Burst 2 has 0.3 to burst 0 and 0.2 to burst 1.
     counts = episode(pairs_of(TWO_KINDS), LABELS, [0, 1, 2], np.array([0.24, 0.26]))
     assert counts.false_positive.tolist() == [[1, 0]]
+
+
+def test_the_nearest_category_is_asked_of_a_memory_that_holds_all_others() -> None:
+    # The last is the only one of its kind, and is not asked.
+    similarity = np.array([[1, 0.8, 0.7, 0], [0.8, 1, 0.1, 0], [0.7, 0.1, 1, 0], [0, 0, 0, 1.0]])
+    labels = np.array([0, 0, 0, 1])
+    assert nearest_category(SetSource(pairs_of(similarity), 2), labels) == 1
+    assert nearest_category(SetSource(pairs_of(TWO_KINDS), 2), LABELS) == 1
+    swapped = np.array([0, 1, 0, 1])
+    assert nearest_category(SetSource(pairs_of(TWO_KINDS), 2), swapped) == 0
 
 
 def test_joining_the_majority_is_right_even_in_a_mixed_category() -> None:

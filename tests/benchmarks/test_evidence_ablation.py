@@ -7,6 +7,7 @@ import pytest
 
 from benchmarks.evidence_ablation import Choice, row, varied
 from benchmarks.matches import adapted, match_table
+from benchmarks.pair_scores import nearest_accuracy
 from core.evidence import PATCHES, Adaptation
 
 
@@ -15,15 +16,16 @@ def test_one_choice_is_varied_at_a_time() -> None:
     today = choices["today's"]
     assert today == Choice(PATCHES)
     for choice in list(choices.values())[1:]:
-        assert sum(getattr(choice, name) != getattr(today, name) for name in ("patches", "adapted", "cohort")) == 1
+        assert sum(getattr(choice, name) != getattr(today, name) for name in ("patches", "adapted", "deviations")) == 1
 
 
-@pytest.mark.parametrize("cohort", [1, 3])
-def test_a_hub_is_not_the_nearest_once_its_level_is_taken_off(cohort: int) -> None:
+@pytest.mark.parametrize("deviations", [0, 3])
+def test_a_hub_is_not_the_nearest_once_its_level_is_taken_off(deviations: float) -> None:
     matches = np.array([[1.0, 0.58, 0.3, 0.6], [0.58, 1.0, 0.3, 0.6], [0.3, 0.3, 1.0, 0.6], [0.6, 0.6, 0.6, 1.0]])
-    found = row("it", matches, cohort, np.array([0, 0, 1, 2]))
-    assert found["change"] == "it"
-    assert (found["nearest"] == 1.0) == (cohort == 3)
+    labels = np.array([0, 0, 1, 2])
+    assert nearest_accuracy(matches, labels) == 0
+    found = row("it", matches, deviations, labels)
+    assert (found["change"], found["nearest"]) == ("it", 1.0)
 
 
 def test_tables_are_symmetric_and_adapted_to_what_is_asked() -> None:
