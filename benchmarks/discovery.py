@@ -29,29 +29,18 @@ from benchmarks.matches import matches
 from benchmarks.pair_scores import PairScores, auroc, hardest, nearest_accuracy, same_and_other
 from benchmarks.parallel import map_jobs
 from benchmarks.tables import Row, print_table, write_json
+from benchmarks.thresholds import default_threshold, threshold_grid
 from clients.datasets.sources import find_sequences
 from core.backbones import load_backbone
 from core.backbones.whitening import Whitening
-from core.calibration import Calibration, Prior
+from core.calibration import Prior
 from core.encode import EncodedBurst, Encoder
 from core.errors import InvalidInput
 from core.scores import BEST, SCORES, require_score
 from core.views import FloatArray
 
-LEVELS = np.concatenate([np.linspace(0, 0.9, 7), 1 - np.geomspace(0.1, 0.001, 10)])
-"""Quantiles of the similarities between bursts at which a curve has a threshold."""
-TRADE, TRADE_ABOVE = 40, 0.9
-"""Thresholds between this quantile and the most similar pair, evenly spaced: here the errors trade."""
-BEYOND = 8
-"""Thresholds between the most similar pair of bursts and a burst to itself: evidence in a small memory is larger than between many."""
-SUMS = 30
-"""Further thresholds of a sum, which grows with the members of a category."""
-SUM_REACH = 10.0
-"""How far those reach: the sum over all bursts, each presented this often."""
 JOB_EPISODES = 10
 """Episodes that a worker does in one go."""
-TINY = 1e-3
-"""Added to the largest similarity there can be, so that a curve ends with everything novel."""
 BAND = (0.05, 0.95)
 """Of the episodes, which share of them the band around a curve holds."""
 TOKENS = "best, tokens alone"
@@ -299,23 +288,3 @@ def run_calibrated(job: Job) -> calibrated.Answers:
     """The same with thresholds from rates."""
     assert isinstance(job.pairs, BestPairs)
     return total([calibrated.episode(job.pairs, job.labels, order, job.thresholds.tolist()) for order in job.orders])
-
-
-def default_threshold(name: str, pairs: PairScores | BestPairs) -> float:
-    """The threshold of a score where nobody says otherwise; of `best` the one of a memory that has met nothing, at 1 %."""
-    if name in SCORES:
-        return SCORES[name].threshold
-    verified = isinstance(pairs, BestPairs) and pairs.agreement is not None
-    return Calibration.fit([], Prior.shipped().of(verified)).threshold(0.01)
-
-
-def threshold_grid(name: str, pairs: PairScores | BestPairs, single: FloatArray, own: float) -> FloatArray:
-    """Ascending thresholds, shape (T,): where similarities lie, the score's own, and one that nothing exceeds."""
-    top = float(single.max())  # of a burst to itself
-    between = single[~np.eye(len(single), dtype=bool)]
-    largest = float(between.max())
-    trade = np.linspace(float(np.quantile(between, TRADE_ABOVE)), largest, TRADE)
-    grid = [np.quantile(between, LEVELS), trade, np.linspace(largest, top, BEYOND), [own, top + TINY]]
-    if isinstance(pairs, PairScores) and pairs.aggregation == "sum":
-        grid.append(np.geomspace(top, pairs.part.sum(axis=0).max() * SUM_REACH + TINY, SUMS))
-    return np.unique(np.concatenate(grid))

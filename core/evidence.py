@@ -1,11 +1,12 @@
 """Our similarity of a burst to a category (`best`): whitened patches matched view by view, less what both resemble anyway.
 
-Three things beyond the paper's cosines of [CLS]:
+Four things beyond the paper's cosines of [CLS]:
 - patches of the block that serves correspondences, whitened by what ships and then by what this memory has seen;
 - every view counts by the other side's view it matches best, since opposite sides of one object look unalike;
 - a match counts by how far it exceeds what burst and member reach with other categories: some objects resemble everything (hubs), some
   everything a little and some nothing, and a burst of many views finds a good match for each of them. What is left grows neither with the
-  number of views nor with that of categories. (Speaker recognition normalises scores by a cohort in this way.)
+  number of views nor with that of categories (speaker recognition normalises its scores by a cohort likewise);
+- two members of a category speak for it, where it has two.
 
 Letters: V, W views, K patches a view, D token size, C categories.
 """
