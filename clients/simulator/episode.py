@@ -101,26 +101,31 @@ class Episode:
         arm = Arm(world, self._conduct.arm)
         burst = self._without_lost(arm.glance(self._conduct.views, chance.randrange(1 << 16)), chance)
         arm.offsets_deg.clear()
+        decided = self._decided(arm, thing, burst)
+        scanned = _scanned(decided.seen, arm)
+        if scanned.learnt is not None:
+            self._truth.add(scanned.learnt.id, Founder.of(thing))
+        visit = Visit()
+        if decided.seen.outcome == "known" and self._conduct.waypoints:
+            visit = visit_waypoints(
+                self._robot, arm, decided.seen, decided.burst, self._conduct.waypoints, chance.randrange(1 << 16), decided.error
+            )
+        return self._encounter(number, arm, decided, scanned, visit)
+
+    def _decided(self, arm: Arm, thing: WorldObject, burst: Burst) -> _Decided:
         in_memory = self._truth.has(thing.category)
         started = time.perf_counter()
         try:
             seen, burst, looks = observe_until_sure(self._robot, arm, burst)
         except NoObjectProblem as problem:
             seen, looks = _nothing_seen(problem), 1
-        observe_ms = (time.perf_counter() - started) * 1e3
+        ms = (time.perf_counter() - started) * 1e3
         founder = self._truth.founder(seen.category_id)
         verdict = judge(seen.outcome, thing.category, founder, in_memory)
+        return _Decided(thing, seen, burst, looks, in_memory, founder, verdict, ms)
 
-        def error(answer: Observation) -> PoseError | None:
-            return _error(answer, founder, thing) if verdict is Verdict.RECOGNISED else None
-
-        scanned = _scanned(seen, arm)
-        learnt = scanned.learnt
-        if learnt is not None:
-            self._truth.add(learnt.id, Founder.of(thing))
-        visit = Visit()
-        if seen.outcome == "known" and self._conduct.waypoints:
-            visit = visit_waypoints(self._robot, arm, seen, burst, self._conduct.waypoints, chance.randrange(1 << 16), error)
+    def _encounter(self, number: int, arm: Arm, decided: _Decided, scanned: _Scanned, visit: Visit) -> Encounter:
+        thing, seen, founder, learnt = decided.thing, decided.seen, decided.founder, scanned.learnt
         most_similar = seen.similarities[0] if seen.similarities else None
         nearest = self._truth.founder(most_similar.category_id) if most_similar else None
         return Encounter(
@@ -129,26 +134,26 @@ class Episode:
             category=thing.category,
             observation_id=seen.id,
             outcome=seen.outcome,
-            verdict=verdict,
+            verdict=decided.verdict,
             category_id=seen.category_id,
             kind=founder.category if founder else None,
             nearest_kind=nearest.category if nearest else None,
             similarity=most_similar.similarity if most_similar else None,
             threshold=seen.threshold,
-            in_memory=in_memory,
+            in_memory=decided.in_memory,
             has_truth=thing.world_from_model is not None,
-            error=error(seen),
+            error=decided.error(seen),
             learnt=learnt.id if learnt else None,
             learnt_views=learnt.views if learnt else 0,
             founder_matrix=thing.world_from_model.as_matrix().tolist() if learnt and thing.world_from_model else None,
             best_view=best_view(seen),
-            views=len(burst),
-            looks=looks,
+            views=len(decided.burst),
+            looks=decided.looks,
             offsets_deg=tuple(arm.offsets_deg),
             refused=arm.refused + len(scanned.report.out_of_reach),
             view_faults=tuple(scanned.report.faults),
             failure=scanned.failure,
-            observe_ms=observe_ms,
+            observe_ms=decided.ms,
             scan_ms=scanned.ms,
             motion_s=arm.clock_s,
             timings_ms=dict(seen.timings_ms),
@@ -195,6 +200,32 @@ def _nothing_seen(problem: NoObjectProblem) -> Observation:
 
 
 @dataclass(frozen=True)
+class _Decided:
+    """What the service said of an object in the end, and what that was worth."""
+
+    thing: WorldObject
+    seen: Observation
+    burst: Burst
+    """The views it was said of, further ones included."""
+    looks: int
+    in_memory: bool
+    """Whether an object of the thing's category had founded one before."""
+    founder: Founder | None
+    """Of the category decided for."""
+    verdict: Verdict
+    ms: float
+
+    def error(self, answer: Observation) -> PoseError | None:
+        """Of an answer's pose, where the thing was rightly recognised and both true poses are known."""
+        thing, founder = self.thing, self.founder
+        if self.verdict is not Verdict.RECOGNISED or answer.pose is None or founder is None:
+            return None
+        if founder.world_from_model is None or thing.world_from_model is None:
+            return None
+        return pose_error(answer.pose.target_from_reference, founder.world_from_model, thing.world_from_model, thing.symmetries)
+
+
+@dataclass(frozen=True)
 class _Scanned:
     """What came of an answer's scan, where it asked for one."""
 
@@ -215,9 +246,3 @@ def _scanned(seen: Observation, arm: Arm) -> _Scanned:
     except COULD_NOT as problem:
         failure = str(problem)
     return _Scanned(learnt, failure, (time.perf_counter() - started) * 1e3, report)
-
-
-def _error(seen: Observation, founder: Founder | None, thing: WorldObject) -> PoseError | None:
-    if seen.pose is None or founder is None or founder.world_from_model is None or thing.world_from_model is None:
-        return None
-    return pose_error(seen.pose.target_from_reference, founder.world_from_model, thing.world_from_model, thing.symmetries)
