@@ -60,35 +60,25 @@ def create_app(
     `compute` is given where others have the backbone. `asks` is False where nobody but this process reaches it: then it asks for no key.
     `warm` is how objects are followed.
     """
-
     metrics = Metrics()
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         with open_agent(settings, metrics, backbone, compute) as agent:
-            work = metrics.watched_queue(settings.workers, settings.queue, settings.deadline_s)
-            demo = Demo()
             app.state.running = Running(
                 settings=settings,
                 metrics=metrics,
                 agent=agent,
                 guard=Guard(agent.memory.keys, agent.memory.sessions, settings.rate_limit, asks=asks),
-                work=work,
-                demo=demo,
+                work=metrics.watched_queue(settings.workers, settings.queue, settings.deadline_s),
+                demo=Demo(),
                 made=MADE,
                 tracks=set(),
                 warm=warm,
             )
             metrics.tell_build(agent.backbone.name)
-            async with anyio.create_task_group() as tasks:
-                tasks.start_soon(_keep_pruned, agent.memory)
-                try:
-                    yield
-                finally:
-                    work.stop()
-                    await run_sync(demo.close)
-                    await work.finished()  # the memory is closed after this
-                tasks.cancel_scope.cancel()
+            async with _working(app.state.running):
+                yield
 
     app = FastAPI(
         title="OneLook",
@@ -105,6 +95,20 @@ def create_app(
     install_endpoints(app)
     install_console(app)
     return app
+
+
+@asynccontextmanager
+async def _working(running: Running) -> AsyncIterator[None]:
+    """Prunes the memory meanwhile; ends once all work has, after which the memory may be closed."""
+    async with anyio.create_task_group() as tasks:
+        tasks.start_soon(_keep_pruned, running.agent.memory)
+        try:
+            yield
+        finally:
+            running.work.stop()
+            await run_sync(running.demo.close)
+            await running.work.finished()
+        tasks.cancel_scope.cancel()
 
 
 async def _keep_pruned(memory: Memory) -> None:

@@ -5,12 +5,15 @@ from __future__ import annotations
 import json as jsonlib
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from clients.cli.simulate import Out, ServiceUrl, service
 from clients.cli.terminal import Json, console, errors, print_facts, print_json
+
+if TYPE_CHECKING:
+    from clients.simulator.rearrange import RearrangeSummary
 
 CATEGORIES = ["mug", "teapot", "car", "camera", "chair", "duck", "house", "locomotive", "clock", "laptop"]
 """Without those that are alike from several sides."""
@@ -54,17 +57,18 @@ def rearrange(
     if json:
         print_json(asdict(summary))
         return
-    print_facts(
-        {
-            "brought to the goal": f"{summary.moved} of {summary.trials}; {summary.recognised} recognised",
-            "within 30° and 5 cm": f"{summary.success:.0f} % of all",
-            "Acc30, Acc15, Acc7.5": f"{summary.acc30:.0f} %, {summary.acc15:.0f} %, {summary.acc7_5:.0f} % of all",
-            "rotation": f"{_or_none(summary.median_deg, 1)}° median, {_or_none(summary.start_median_deg, 1)}° before",
-            "position of the base": f"{_or_none(summary.median_m, 100)} cm median, {_or_none(summary.start_median_m, 100)} cm before",
-            "time": f"{summary.total_s:.0f} s",
-            "written": f"{out / 'rearrange.json'}, {out / 'rearrange.png'}",
-        }
-    )
+    print_facts(_facts(summary) | {"written": f"{out / 'rearrange.json'}, {out / 'rearrange.png'}"})
+
+
+def _facts(summary: RearrangeSummary) -> dict[str, str]:
+    return {
+        "brought to the goal": f"{summary.moved} of {summary.trials}; {summary.recognised} recognised",
+        "within 30° and 5 cm": f"{summary.success:.0f} % of all",
+        "Acc30, Acc15, Acc7.5": f"{summary.acc30:.0f} %, {summary.acc15:.0f} %, {summary.acc7_5:.0f} % of all",
+        "rotation": f"{_or_none(summary.median_deg, 1)}° median, {_or_none(summary.start_median_deg, 1)}° before",
+        "position of the base": f"{_or_none(summary.median_m, 100)} cm median, {_or_none(summary.start_median_m, 100)} cm before",
+        "time": f"{summary.total_s:.0f} s",
+    }
 
 
 def _or_none(value: float | None, factor: float) -> str:
