@@ -1,6 +1,7 @@
 """The score `best` over episodes: evidence as `core.evidence` and `core.novelty` make it, from tables of all pairs.
 
-Letters: T memories side by side, C categories (room for them), H bursts held, S shortlisted categories, N bursts, G stages of the centre.
+Letters: T memories side by side, C categories (as many as the largest has), H bursts held, S shortlisted categories (SHORTLIST, or C where
+that is less), N bursts, G stages of what a memory adapts to (`benchmarks.matches.STAGES`).
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ class BestPairs:
     prior: Prior
 
     def single(self) -> FloatArray:
-        """Evidence of every burst alone for every burst, shape (N, N), as if each were a category of its own."""
+        """Evidence of every burst alone for every burst, shape (N, N), with poses where there are any: as `single_evidence`."""
         evidence = single_evidence(self.match[-1], self.prior)
         return evidence if self.agreement is None else evidence + self.prior.agreement_weight * self.agreements()
 
@@ -47,14 +48,21 @@ class BestPairs:
 
 
 def single_evidence(match: FloatArray, prior: Prior, deviations: float = DEVIATIONS) -> FloatArray:
-    """Evidence by tokens of every burst alone for every burst, from their matches, both (N, N); all others are the cohort."""
+    """Evidence by tokens of every burst for every burst, from their matches, both (N, N), as if each were a category of its own.
+
+    Simpler than the rule: the cohort of each is all others, the burst it is compared with among them.
+    """
     others = np.where(np.eye(len(match), dtype=bool), -np.inf, match)
     level = cohort_level(others, prior.usual, deviations)
     return np.asarray(match - (level[:, None] + level[None, :]) / 2)
 
 
 class BestSource:
-    """See `benchmarks.episodes.Source`. A category is represented to others by its founder, whose reference is also what poses verify."""
+    """See `benchmarks.episodes.Source`. A category is represented to others by its founder, whose reference is also what poses verify.
+
+    Unlike a service's, a memory holds a burst that comes again once, in the category that it joined last. All are adapted to the number of
+    bursts that any of them holds.
+    """
 
     def __init__(self, pairs: BestPairs, room: int) -> None:
         self._pairs, self._room = pairs, room
@@ -74,12 +82,12 @@ class BestSource:
         return categories[:, 0], evidence[:, 0]
 
     def ranked(self, burst: int, used: IntArray, without: IntArray, verify: IntArray | None = None) -> tuple[IntArray, FloatArray]:
-        """Shortlisted categories and their evidence, most first, shapes (T, S), (T, S); −inf where there are fewer.
+        """Shortlisted categories and their evidence, most first, shapes (T, S), (T, S); −inf where a memory has fewer.
 
         Args:
             used: number of categories, shape (T,).
             without: a category of each memory that is left out, −1 for none, shape (T,).
-            verify: the only categories whose poses take part, shape (T, VERIFIED), else those with the most evidence.
+            verify: the only categories whose poses take part, as of `verified`; those with the most evidence here where left out.
         """
         most = max(int(used.max()), 1)
         there = (np.arange(most) < used[:, None]) & (np.arange(most) != without[:, None])
@@ -103,7 +111,7 @@ class BestSource:
             self._held.append(burst)
 
     def _by_tokens(self, stage: int, burst: int, shortlist: IntArray, there: NDArray[np.bool_]) -> FloatArray:
-        """See `core.evidence.Comparison`, shape (T, S), of `there`, the categories that count, shape (T, C)."""
+        """Evidence for the shortlist, shape (T, S), as of `core.evidence.Comparison`; `there` says which categories count, shape (T, C)."""
         match, usual, held = self._pairs.match[stage], self._pairs.prior.usual, np.array(self._held, dtype=np.intp)
         if not len(held):
             return np.zeros(shortlist.shape)
@@ -119,6 +127,7 @@ class BestSource:
         return np.asarray(evidence.sum(axis=2) / np.maximum(is_one.sum(axis=2), 1))
 
     def _verification(self, burst: int, shortlist: IntArray, evidence: FloatArray, verify: IntArray | None) -> FloatArray:
+        """What poses add to the evidence, shape (T, S); `verify` as of `ranked`."""
         assert self._agreement is not None
         gained = self._agreement[np.take_along_axis(self._founder, shortlist, axis=1), burst]
         if verify is None:
@@ -127,7 +136,7 @@ class BestSource:
         return np.where((shortlist[:, :, None] == verify[:, None, :]).any(axis=2), gained, 0.0)
 
     def verified(self, burst: int, used: IntArray) -> IntArray:
-        """The categories whose poses a decision tries, shape (T, VERIFIED)."""
+        """The categories whose poses a decision tries, shape (T, up to VERIFIED)."""
         kept, self._agreement = self._agreement, None
         try:
             return self.ranked(burst, used, np.full(len(used), -1))[0][:, :VERIFIED]

@@ -1,8 +1,10 @@
 """Makes the figures that stand in for a memory's own while it holds little: `python -m benchmarks.decision_prior --data DIR`.
 
 Every burst below DIR is taken out in turn and compared with all others: with its own category (by other instances of it), and with the
-rest as if its own were not there. A memory that holds little has nothing to adapt to, so nothing is adapted here either. The shipped file
-is made from the sample bursts.
+rest as if its own were not there; all of the rest are its cohort. A memory that holds little has nothing to adapt to, so nothing is adapted
+here either. The shipped file is made from the sample bursts.
+
+Letters: N bursts.
 """
 
 from __future__ import annotations
@@ -43,16 +45,22 @@ def main(data: Annotated[Path, typer.Option(help="folder of bursts")], out: Anno
 
 
 def write(out: Path, fingerprint: str, labels: NDArray[np.intp], match: FloatArray, agreement: FloatArray) -> Path:
-    """From the category of each burst, shape (N,), and matches and agreements of all pairs, each (N, N)."""
-    others = np.concatenate([match[_founders(labels, x, labels[x]), x] for x in range(len(labels))])
+    """Writes the figures to `out`, and returns it.
+
+    Args:
+        labels: the category of each burst, shape (N,): two or more, one of them with two bursts.
+        match: matches of all pairs, shape (N, N).
+        agreement: of the reference of burst i with burst j at the best pose, shape (N, N); all bursts must have depth and cameras.
+    """
+    others = np.concatenate([match[_founders(labels, burst, labels[burst]), burst] for burst in range(len(labels))])
     usual = Usual(round(float(others.mean()), 4), round(float(others.std()), 4))
     wrong: list[list[tuple[float, float]]] = []
     own: list[tuple[float, float]] = []
-    for x in range(len(labels)):
-        found = {c: _evidence(match, labels, x, c, usual) for c in set(labels.tolist()) if _others(labels, x, c)}
-        founder = {c: agreement[_others(labels, x, c)[0], x] for c in found}
-        wrong.append([(found[c], founder[c]) for c in found if c != labels[x]])
-        own += [(found[c], founder[c]) for c in found if c == labels[x]]
+    for burst in range(len(labels)):
+        found = {each: _evidence(match, labels, burst, each, usual) for each in set(labels.tolist()) if _others(labels, burst, each)}
+        by_pose = {each: agreement[_others(labels, burst, each)[0], burst] for each in found}
+        wrong.append([(found[each], by_pose[each]) for each in found if each != labels[burst]])
+        own += [(found[each], by_pose[each]) for each in found if each == labels[burst]]
     tokens, poses = (np.array([pair[part] for pairs in wrong for pair in pairs]) for part in (0, 1))
     weight = float(tokens.std() / poses.std())
 
@@ -71,20 +79,22 @@ def write(out: Path, fingerprint: str, labels: NDArray[np.intp], match: FloatArr
     return out
 
 
-def _evidence(match: FloatArray, labels: NDArray[np.intp], x: int, category: int, usual: Usual) -> float:
-    """Of burst x for a category, all bursts but x being in the memory and its own category only where it is the one asked about."""
-    members = sorted(_others(labels, x, category), key=lambda index: -match[index, x])[:MEMBERS]
-    founders = [f for f in _founders(labels, x, category) if labels[f] != labels[x]]
-    of_burst, *of_members = (float(cohort_level(match[founders, each], usual)) for each in (x, *members))
-    return float(np.mean([match[member, x] - (of_burst + level) / 2 for member, level in zip(members, of_members)]))
+def _evidence(match: FloatArray, labels: NDArray[np.intp], burst: int, category: int, usual: Usual) -> float:
+    """Evidence of a burst for a category, all other bursts being in the memory, but of its own category only if that is asked about."""
+    members = sorted(_others(labels, burst, category), key=lambda index: -match[index, burst])[:MEMBERS]
+    founders = [founder for founder in _founders(labels, burst, category) if labels[founder] != labels[burst]]
+    of_burst, *of_members = (float(cohort_level(match[founders, each], usual)) for each in (burst, *members))
+    return float(np.mean([match[member, burst] - (of_burst + level) / 2 for member, level in zip(members, of_members)]))
 
 
-def _others(labels: NDArray[np.intp], x: int, category: int) -> list[int]:
-    return [int(index) for index in np.flatnonzero(labels == category) if index != x]
+def _others(labels: NDArray[np.intp], burst: int, category: int) -> list[int]:
+    """The bursts of a category, without the one that is compared."""
+    return [int(index) for index in np.flatnonzero(labels == category) if index != burst]
 
 
-def _founders(labels: NDArray[np.intp], x: int, without: int) -> list[int]:
-    return [_others(labels, x, c)[0] for c in sorted(set(labels.tolist())) if c != without and _others(labels, x, c)]
+def _founders(labels: NDArray[np.intp], burst: int, without: int) -> list[int]:
+    """The first burst of each category but one, as if the burst that is compared were not there."""
+    return [_others(labels, burst, each)[0] for each in sorted(set(labels.tolist())) if each != without and _others(labels, burst, each)]
 
 
 def _rounded(values: Sequence[float]) -> list[float]:

@@ -85,7 +85,7 @@ class Job:
     orders: list[list[int]]
     """The bursts of each episode."""
     thresholds: FloatArray
-    """Or rates, shape (T,)."""
+    """Thresholds of a curve, or rates, shape (T,)."""
 
 
 @dataclass(frozen=True)
@@ -263,7 +263,7 @@ def sum_jobs(
     thresholds: FloatArray,
     name: str,
 ) -> Total:
-    """What `function` counts over all orders, in parallel; labels and thresholds as of `Job`."""
+    """What `function` counts over all orders, in parallel; labels and thresholds as of `Job`, `name` is what progress is reported of."""
     chunks = [orders[start : start + JOB_EPISODES] for start in range(0, len(orders), JOB_EPISODES)]
     return total(map_jobs(function, [Job(pairs, labels, chunk, thresholds) for chunk in chunks], lambda job: len(job.orders), name))
 

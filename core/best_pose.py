@@ -1,6 +1,6 @@
 """The variant `best`, which is ours: many hypotheses, the most promising refined, judged by how well they lay the objects on each other.
 
-Letters: M reference views, N target views.
+Letters: S symmetries.
 """
 
 from __future__ import annotations
@@ -53,7 +53,8 @@ def by_agreement(
 ) -> PoseEstimate:
     """Ours: many hypotheses, the most promising refined, the one that lays the objects on each other best.
 
-    Of poses that are the same after a symmetry of the reference the best alone is listed: they are no rivals.
+    Of poses that are the same after one of `symmetries` of the reference, shape (S, 3, 3), the best alone is listed: they are no rivals.
+    `threshold_m` is the inlier distance.
     """
     guesses = propose(pair, config.hypotheses, threshold_m, seed)
     if not len(guesses):

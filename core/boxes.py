@@ -1,6 +1,6 @@
 """The object's cloud and its oriented box (paper, appendix, "Bounding boxes for visualising pose estimates").
 
-Letters: N points.
+Letters: N points, V views.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ MIN_POINTS = 8
 EXTENT_PERCENTILE = 98
 """Of the distances to the middle: the farthest points are often stray."""
 NEIGHBOURS = 10
+"""Of a point, the nearest ones, by whose mean distance an outlier is told."""
 OUTLIER_DEVIATIONS = 2.0
 """A point whose mean distance to its neighbours is this many standard deviations above the cloud's mean is an outlier.
 The appendix uses a fixed distance (5e-5 m), which depends on resolution; this does not."""
@@ -146,7 +147,8 @@ def oriented_box(points: FloatArray) -> OrientedBox:
 
 
 def cloud_extent_m(points: FloatArray) -> float:
-    """A cloud's diameter, metres: twice the EXTENT_PERCENTILE of the distance to the median point; robust to stray points."""
+    """Diameter, metres, of a cloud, shape (N, 3): twice the EXTENT_PERCENTILE of the distance to the median point, so robust to stray
+    points; 0 of an empty one."""
     if not len(points):
         return 0.0
     return float(2 * np.percentile(np.linalg.norm(points - np.median(points, axis=0), axis=1), EXTENT_PERCENTILE))

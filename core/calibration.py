@@ -3,9 +3,12 @@
 What is wanted is how much evidence an object of no known category finds for the best of the wrong ones. Every decision gives one sample
 of that, without any label: of a known object the best of the other categories, had its own not been there (its rival); of a novel one the
 best of all. No similarity within a category enters, so it does not matter that a category was seen in one instance only, whose views are
-more alike than two instances are. That gap shows in the estimated probability alone, where the shipped figures are of different instances.
+more alike than two instances are. That gap shows only where right and wrong are weighed, in the estimated probability and in the point
+where they are even: there the shipped figures, which are of different instances, always stand for the right category.
 
 Until the memory has samples of its own the shipped ones stand in (`python -m benchmarks.decision_prior` makes them).
+
+Letters: N samples, L quantiles.
 """
 
 from __future__ import annotations
@@ -17,12 +20,10 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import stdtrit
 
 from core.evidence import Usual
-
-FloatArray = NDArray[np.floating]
+from core.views import FloatArray
 
 SHIPPED = Path(__file__).parent / "backbones" / "statistics" / "decision.json"
 PRIOR_SAMPLES = 10.0
@@ -37,6 +38,10 @@ LEARN_FACTOR = 0.1
 a false member misleads every later one."""
 LARGEST_RATE = 0.5
 """Above it a threshold would lie below the median of what is wrong."""
+LEAST_SPREAD = 1e-6
+"""Where all samples are the same: a distribution without width has no odds."""
+LARGEST_LOG_ODDS = 50.0
+"""Beyond it a probability is 0 or 1 but for rounding, and its exponential would overflow at last."""
 
 
 @dataclass(frozen=True)
@@ -56,10 +61,13 @@ class Prior:
     fingerprint: str
     """Of the backbone it was measured with; with another one it is a start, and no more."""
     usual: Usual
+    """Matches with other categories, adapted to nothing."""
     agreement_weight: float
     """Evidence a unit of agreement of a pose is worth: such that both vary as much among wrong categories."""
     tokens: Samples
+    """Of evidence from tokens alone."""
     verified: Samples
+    """Of evidence with poses."""
 
     def of(self, verified: bool) -> Samples:
         """The samples of one kind of evidence."""
@@ -90,13 +98,17 @@ class Calibration:
     """The evidence for the best wrong category as a Student distribution, and for the right one as a normal one of the same spread."""
 
     location: float
+    """Median evidence for the best wrong category."""
     spread: float
+    """Standard deviation of either, were they normal."""
     freedom: float
+    """Degrees of freedom of the Student distribution."""
     own_location: float
+    """Median evidence for the right category, of what ships."""
 
     @staticmethod
     def fit(rivals: Sequence[float], prior: Samples) -> Calibration:
-        """From the memory's own rivals and the shipped samples.
+        """From the memory's own rivals, of which there may be none, and the shipped samples.
 
         Location is the median, spread the distance of the lower quantile: an object that was called novel though its category is known
         counts among the rivals with too much evidence, and must not move the threshold.
@@ -104,7 +116,7 @@ class Calibration:
         values = np.concatenate([np.asarray(prior.rivals), np.asarray(rivals, dtype=float)])
         weights = np.concatenate([np.full(len(prior.rivals), PRIOR_SAMPLES / len(prior.rivals)), np.ones(len(rivals))])
         low, middle = _quantiles(values, weights, (LOWER, 0.5))
-        return Calibration(middle, max(middle - low, 1e-6), float(weights.sum()) - 1, float(np.median(prior.own)))
+        return Calibration(middle, max(middle - low, LEAST_SPREAD), float(weights.sum()) - 1, float(np.median(prior.own)))
 
     def threshold(self, rate: float) -> float:
         """What an object of no known category exceeds with this probability."""
@@ -120,8 +132,10 @@ class Calibration:
         return Levels(known, min(max(uncertain, self.even), known) if looks else uncertain, learn)
 
     def probability(self, evidence: float) -> float:
-        """That the most similar category is right, with even odds beforehand; grows with the evidence."""
-        return float(1 / (1 + np.exp(np.clip(-(evidence - self.even) * self._apart / self.spread**2, -50, 50))))
+        """That the most similar category is right, with even odds beforehand; grows with the evidence, since both distributions are
+        taken for normal ones here."""
+        log_odds_against = np.clip(-(evidence - self.even) * self._apart / self.spread**2, -LARGEST_LOG_ODDS, LARGEST_LOG_ODDS)
+        return float(1 / (1 + np.exp(log_odds_against)))
 
     @property
     def even(self) -> float:
@@ -134,6 +148,7 @@ class Calibration:
 
 
 def _quantiles(values: FloatArray, weights: FloatArray, levels: Sequence[float]) -> FloatArray:
+    """Of weighted samples, both shape (N,), at levels in [0, 1], shape (L,)."""
     order = np.argsort(values)
     cumulative = np.cumsum(weights[order]) - weights[order] / 2
     return np.asarray(np.interp(np.asarray(levels) * weights.sum(), cumulative, values[order]))

@@ -1,6 +1,6 @@
 """Where the object is: a soft foreground map to a close square crop (paper, appendix, "Attention maps for object detection").
 
-Letters: V views, S crop side in pixels, G patches a side.
+Letters: H, W image height and width, S side of a crop or of a map of it, P cells.
 """
 
 from __future__ import annotations
@@ -12,7 +12,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.floating]
+from core.views import FloatArray
+
 PADDING_RGB = (124, 116, 104)
 """ImageNet's mean colour, which the backbone sees as zero, outside the image."""
 
@@ -38,7 +39,10 @@ class Window:
         return origin + (np.asarray(cells, dtype=float)[:, ::-1] + 0.5) * step - 0.5
 
     def cut(self, image: NDArray[Any], side: int, *, nearest: bool = False) -> NDArray[Any]:
-        """The region resampled to side×side; outside the image colour is the mean colour, everything else 0."""
+        """The region of an image, shape (H, W) or (H, W, 3), resampled to (side, side) or (side, side, 3).
+
+        Outside the image colour is the mean colour, everything else 0.
+        """
         height, width = image.shape[:2]
         left, top = max(0, -self.x0), max(0, -self.y0)
         right, bottom = max(0, self.x0 + self.size - width), max(0, self.y0 + self.size - height)
@@ -50,7 +54,7 @@ class Window:
         return cv2.resize(padded, (side, side), interpolation=mode)
 
     def paste(self, soft: FloatArray, size: tuple[int, int]) -> FloatArray:
-        """A map of the region, shape (S, S), resampled onto the image, shape `size`; 0 outside the region."""
+        """A map of the region, shape (S, S), resampled onto the image, shape `size`, which is (H, W); 0 outside the region."""
         height, width = size
         across = cv2.resize(soft, (self.size, self.size), interpolation=cv2.INTER_LINEAR)
         image = np.zeros(size, dtype=np.float32)
@@ -61,7 +65,7 @@ class Window:
 
 
 def largest_component(soft: FloatArray, threshold: float) -> NDArray[np.bool_]:
-    """The connected component of `soft` > threshold with the largest sum of `soft`; all False where nothing exceeds it.
+    """The connected component of `soft` > threshold with the largest sum of `soft`, both shape (S, S); all False where nothing exceeds it.
 
     Ranking by the sum rather than the area keeps a faint strip of background from winning over a small bright object.
     """
@@ -75,7 +79,10 @@ def largest_component(soft: FloatArray, threshold: float) -> NDArray[np.bool_]:
 
 
 def close_window(component: NDArray[np.bool_], window: Window, margin: float) -> Window:
-    """The square around a component found in the crop of `window`, expanded by `margin` of its longer side in all."""
+    """The square around a component found in the crop of `window`, expanded by `margin` of its longer side in all.
+
+    `component`: shape (S, S), not empty.
+    """
     rows, columns = np.flatnonzero(component.any(axis=1)), np.flatnonzero(component.any(axis=0))
     step = window.size / component.shape[0]
     height, width = (rows[-1] + 1 - rows[0]) * step, (columns[-1] + 1 - columns[0]) * step

@@ -1,6 +1,6 @@
 """How well a transform lays one object on another: over all foreground points, geometry times appearance.
 
-Letters: N reference points, Q target points, C descriptor size, T transforms.
+Letters: N reference points, Q target points, T transforms.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from core.views import FloatArray
 
 BATCH = 8
 """Transforms scored or matched at once: what lies between them stays in the processor's cache."""
-NO_MATCH = 1e6
+OPPOSITE_PENALTY = 1e6
 """Log agreement that surfaces lose for each unit of cosine beyond OPPOSITE."""
 LEAST_LOG = -60.0
 """Of a choice; smaller ones would be denormal numbers, which processors are slow with."""
@@ -84,7 +84,7 @@ class DenseAgreement:
         for start in range(0, len(transforms), BATCH):
             batch = transforms.select(range(start, min(start + BATCH, len(transforms))))
             opposite = (faces_reference @ batch.rotation.transpose(1, 2) @ faces_target.T).sub_(OPPOSITE).clamp_max_(0)
-            log = self._log_agreement(batch.apply(self._reference), self.config.sigma, 1.0).add_(opposite, alpha=NO_MATCH)
+            log = self._log_agreement(batch.apply(self._reference), self.config.sigma, 1.0).add_(opposite, alpha=OPPOSITE_PENALTY)
             parts.append((log.amax(dim=2).exp().mean(dim=1) * log.amax(dim=1).exp().mean(dim=1)).sqrt())
         return torch.cat(parts)
 

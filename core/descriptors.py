@@ -1,6 +1,6 @@
 """Descriptors: unit vectors, reduced to the reference's principal components (paper, "Dimensionality reduction").
 
-Letters: N tokens, D token size, C components.
+Letters: N tokens, D token size, C components; * is any batch shape.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class PcaBasis:
 
 
 def unit(vectors: FloatArray) -> Float32Array:
-    """Vectors scaled to length 1 along the last axis; zero stays zero."""
+    """Vectors, shape (*, D), scaled to length 1; zero stays zero."""
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
     return np.asarray(vectors / np.maximum(length, 1e-12), dtype=np.float32)
 

@@ -4,7 +4,7 @@ A token changes with the side that its point is seen from and with its place in 
 gladly as what the point is. Views with depth show the same points again and again, so the change can be measured without any label,
 and Fisher's criterion (1936) keeps the directions that vary between points and not within one.
 
-Letters: V views, P patches of a view, D token size, C components, E pairs.
+Letters: D token size, E pairs.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """A burst becomes descriptors: two-pass crop, tokens, foreground, 3-D points.
 
-Letters: V views, G patches a side, P foreground patches of one view, D token size.
+Letters: V views, G patches a side, P foreground patches of one view, D token size, N points of a cloud.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from core.crop import Window, close_window, largest_component
 from core.depth import SAMPLES, cell_depth, reliable
 from core.errors import InvalidInput, NoObject
 from core.foreground import otsu_threshold, vote_by_support
-from core.views import Burst, Camera, View
-
-FloatArray = NDArray[np.floating]
+from core.views import Burst, Camera, FloatArray, View
 
 SHARED = 32
 """Views are shown a multiple of so many patches: those that see as many go through the backbone together."""
 MAX_COVER = 0.95
 """A foreground that covers more of the whole image than this is a blank wall, not an object."""
+COVERED = 0.5
+"""Share of a patch's samples above which, being of the object, they make the patch one of its own."""
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ class EncodedView:
         return replace(self, cells=self.cells[kept], descriptors=self.descriptors[kept], points_m=self.points_m[kept])
 
     @property
-    def pixels(self) -> NDArray[np.floating]:
+    def pixels(self) -> FloatArray:
         """(x, y) in the image of the patches' centres, shape (P, 2)."""
         return self.window.to_pixels(self.cells, self.grid)
 
@@ -209,7 +209,7 @@ class Encoder:
     def _assemble(self, view: View, window: Window, soft: FloatArray, tokens: FloatArray, cls: FloatArray) -> EncodedView:
         grid = self.config.grid
         inside = self._component(soft)
-        foreground = inside.reshape(grid, SAMPLES, grid, SAMPLES).mean(axis=(1, 3)) > 0.5
+        foreground = inside.reshape(grid, SAMPLES, grid, SAMPLES).mean(axis=(1, 3)) > COVERED
         cells = np.argwhere(foreground).astype(np.int16)
         points = np.full((len(cells), 3), np.nan, dtype=np.float32)
         if view.depth_m is not None and view.camera is not None and len(cells):

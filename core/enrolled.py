@@ -30,11 +30,13 @@ T = TypeVar("T")
 EXACT = 64
 """Members up to which every one is compared patch by patch: about 25 ms on two cores with ten views a side."""
 NEAREST = 12
-"""Members, and founders of categories, that are compared patch by patch in a larger memory, beside the cohort."""
+"""So many members, and founders of so many categories, are compared patch by patch in a larger memory, beside the cohort."""
 ADAPTED_FROM = 256
 """Members, evenly spaced, whose patches a larger memory is adapted to; more say nothing new."""
 GROWTH = 1.25
-"""Factor by which a larger memory grows until it is adapted anew, which all comparisons kept so far are lost by."""
+"""Factor by which a larger memory grows until it is adapted anew, whereupon nothing that was kept holds any longer."""
+ROUNDING = 1e-9
+"""Added to a logarithm before it is rounded down: a memory that has just grown by GROWTH counts as grown."""
 KEPT = 512
 """Members whose patches stay in memory, those compared last: up to 200 MB of ten views each."""
 KEPT_COHORTS = 4096
@@ -55,14 +57,14 @@ class Source(Protocol):
 
 
 class Enrolled:
-    """See module. Safe to use from several threads."""
+    """The members of one memory, kept ready. Safe to use from several threads, one of which is served at a time."""
 
     def __init__(self, source: Source, whitening: Whitening | None) -> None:
         self._source, self._whitening = source, whitening
         self._lock = threading.Lock()
         self._listed: Sequence[Listed] = ()
         self._left_out: set[str] = set()
-        """Damaged ones."""
+        """Ids of damaged members."""
         self._near = Nearness()
         self._adapted_to: list[str] = []
         self._matrix, self._offset = torch.zeros(0, 0), torch.zeros(0)
@@ -71,7 +73,7 @@ class Enrolled:
         """By member, its matches with founders, by the founder's id."""
 
     def compare(self, target: EncodedBurst, usual: Usual) -> Comparison | None:
-        """A burst with all members, or the nearest; None where there is none. `usual` as of `Comparison`."""
+        """A burst with all members, or the nearest; None where there is no member. `usual` as of `Comparison`."""
         with self._lock:
             self._update(self._source.listed())
             while len(self._near):
@@ -125,7 +127,7 @@ class Enrolled:
         return {category: known[members[each].id] for category, each in founders.items()}
 
     def _prepared(self, places: Sequence[int]) -> list[Tensor]:
-        """Unit patches of some members, adapted to the memory. Raises _DamagedError."""
+        """Unit patches of some members, adapted to the memory, each (V, K, D). Raises _DamagedError."""
         ids = [self._near.members[place].id for place in places]
         there = {each: self._patches[each] for each in ids if each in self._patches}
         missing = [each for each in ids if each not in there]
@@ -144,7 +146,7 @@ class Enrolled:
         return read
 
     def _directions(self, bursts: Sequence[FloatArray]) -> list[Tensor]:
-        """`whitened` and `Adaptation.directions` in one product."""
+        """`whitened` and `Adaptation.directions` in one product, for bursts of patches, each (V, K, D)."""
         tokens = torch.from_numpy(np.concatenate(bursts).astype(np.float32))
         adapted = torch.nn.functional.normalize(tokens @ self._matrix + self._offset, dim=-1)
         return list(torch.split(adapted, [len(burst) for burst in bursts]))
@@ -173,7 +175,7 @@ class _DamagedError(Exception):
 
 
 class _Latest(OrderedDict[str, T]):
-    """What was kept last."""
+    """A mapping that forgets what was kept longest ago, beyond so many entries."""
 
     def __init__(self, most: int) -> None:
         super().__init__()
@@ -189,9 +191,10 @@ class _Latest(OrderedDict[str, T]):
 
 
 def adapted_from(count: int) -> list[int]:
-    """Places of the members that a memory of so many is adapted to: the same ones until it has grown by GROWTH."""
+    """Places of the members that a memory of so many is adapted to: all of a small one, of a larger one the same until it has grown by
+    GROWTH."""
     if count <= EXACT:
         return list(range(count))
-    steps = int(np.floor(np.log(count / EXACT) / np.log(GROWTH) + 1e-9))
+    steps = int(np.floor(np.log(count / EXACT) / np.log(GROWTH) + ROUNDING))
     size = min(count, int(np.ceil(EXACT * GROWTH**steps)))
     return np.unique(np.linspace(0, size - 1, min(size, ADAPTED_FROM)).astype(int)).tolist()

@@ -8,7 +8,7 @@ Four things beyond the paper's cosines of [CLS]:
   number of views nor with that of categories (speaker recognition normalises its scores by a cohort likewise);
 - two members of a category speak for it, where it has two.
 
-Letters: V, W views, K patches a view, D token size, C categories.
+Letters: V, W views, K patches a view, D token size, C categories, N bursts or members; * is any batch shape.
 """
 
 from __future__ import annotations
@@ -24,8 +24,7 @@ from torch import Tensor
 
 from core.backbones.whitening import Whitening
 from core.encode import EncodedBurst
-
-FloatArray = NDArray[np.floating]
+from core.views import FloatArray
 
 PATCHES = 24
 """Patches kept of each view, drawn at random: the figures of 12 and of 48 differ by less than a hundredth."""
@@ -43,21 +42,26 @@ ADAPTATION_PRIOR = 4.0
 """Bursts for which the shipped mean counts when the memory's own moves it."""
 COVARIANCE_PRIOR = 32.0
 """The same of the covariance: of few objects it would be the differences between just these, and take them out."""
+LEAST_VARIANCE = 1e-12
+"""Added at least in every direction, so that a memory of one and the same token can be adapted to."""
 ADAPTED = 4
 """Every so many-th patch takes part in the statistics: there are thousands, alike within a view."""
 BATCH = 16
-"""Bursts matched at once: about 40 MB."""
+"""Bursts matched at once: about 10 MB with ten views a side."""
 
 
 def sample_patches(encoded: EncodedBurst, patches: int = PATCHES) -> NDArray[np.float16]:
-    """Tokens of random foreground patches, shape (V, K = patches, D), of views that show an object; drawn again where there are fewer."""
+    """Tokens of random foreground patches, shape (V, K = patches, D); where a view has fewer they are repeated.
+
+    V counts the views that show an object, of which there must be one; the encoder answers none otherwise.
+    """
     rng = np.random.default_rng(0)
     shown = [view.descriptors for view in encoded.views if len(view.descriptors)]
     return np.stack([tokens[rng.permutation(len(tokens))[np.arange(patches) % len(tokens)]] for tokens in shown]).astype(np.float16)
 
 
 def whitened(patches: FloatArray, whitening: Whitening | None) -> FloatArray:
-    """The same, whitened where the backbone has statistics."""
+    """Patches, shape (*, D), in single precision, and whitened where the backbone has statistics."""
     return patches.astype(np.float32) if whitening is None else whitening.apply(patches.astype(np.float32))
 
 
@@ -72,9 +76,10 @@ class Adaptation:
 
     @staticmethod
     def fit(members: Sequence[FloatArray]) -> Adaptation:
-        """From the whitened patches of bursts, each (V, K, D), without any label.
+        """From the whitened patches of at least one burst, each (V, K, D), without any label.
 
-        Few bursts say little of D² covariances: mean and covariance are shrunk towards those that ship, which are zero and isotropic here.
+        Few bursts say little of D² covariances: mean and covariance are shrunk towards those that ship, which after whitening are taken to
+        be zero and isotropic. The mean variance is added once more, so that directions of little variance are not blown up.
         """
         drawn = [member[:, ::ADAPTED].reshape(-1, member.shape[-1]).astype(np.float64) for member in members]
         count = len(drawn)
@@ -84,21 +89,21 @@ class Adaptation:
         variance = float(np.trace(covariance)) / len(mean)
         covariance = (count * covariance + COVARIANCE_PRIOR * variance * np.eye(len(mean))) / (count + COVARIANCE_PRIOR)
         variances, vectors = np.linalg.eigh(covariance)
-        scaled = vectors / np.sqrt(variances.clip(0) + max(variance, 1e-12))
+        scaled = vectors / np.sqrt(variances.clip(0) + max(variance, LEAST_VARIANCE))
         return Adaptation(count * mean / (count + ADAPTATION_PRIOR), scaled @ vectors.T)
 
     @staticmethod
     def none(size: int) -> Adaptation:
-        """Of a memory that holds nothing, for tokens of this size D."""
+        """That of a memory that holds nothing, for tokens of size D: it changes nothing."""
         return Adaptation(np.zeros(size), np.eye(size))
 
     def directions(self, patches: FloatArray) -> Tensor:
-        """Unit patches, shape (V, K, D), of whitened ones."""
+        """Adapted patches of length 1, from whitened ones, both shape (V, K, D)."""
         return torch.nn.functional.normalize(torch.from_numpy((patches - self.mean) @ self.matrix).float(), dim=-1)
 
 
 def match_views(target: Tensor, others: Sequence[Tensor]) -> FloatArray:
-    """How well a burst matches each of others, shape (len(others),), of unit patches (V, K, D) and (W, K, D).
+    """How well a burst matches each of N others, shape (N,), from unit patches: (V, K, D), and (W, K, D) of each other.
 
     Two views match by the mean over patches of the cosine to the other's most similar patch, both ways; two bursts by the mean over views
     of the match with the other's best matching view, both ways.
@@ -123,7 +128,10 @@ class Usual:
 
 
 def cohort_level(matches: FloatArray, usual: Usual, deviations: float = DEVIATIONS) -> FloatArray:
-    """DEVIATIONS above the mean of matches with other categories, shape (*) from (*, C); −inf stands for no category."""
+    """So many standard deviations above the mean of the matches with other categories, shape (*) from (*, C); −inf stands for no category.
+
+    Mean and variance are those of the matches and of `usual`, which counts as COHORT_PRIOR of them; without any they are the usual ones.
+    """
     there = matches > -np.inf
     count = there.sum(axis=-1) + COHORT_PRIOR
     mean = (np.where(there, matches, 0.0).sum(axis=-1) + COHORT_PRIOR * usual.mean) / count
@@ -146,21 +154,21 @@ class Matched:
 
     match: float
     cohort: Mapping[str, float]
-    """The member's own matches with the founders of COHORT categories, by category."""
+    """The member's own matches with the founders of the COHORT oldest categories, by category; with its own, too."""
 
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
     """One burst against the categories of a memory, or the nearest of them.
 
-    A category's first member, its founder, represents it to others.
+    A category's oldest member, its founder, represents it to others.
     """
 
     matched: Mapping[str, Sequence[Matched]]
-    """By category, best matching first: up to MEMBERS of its members, the best matching ones. SHORTLIST categories and one more: one may
-    be left out."""
+    """By category, best matching first: up to MEMBERS of its members, the best matching ones. Up to SHORTLIST categories and one more:
+    one may be left out."""
     cohort: Mapping[str, float]
-    """Of the burst with the founders of COHORT categories, by category."""
+    """The burst's matches with the founders of the COHORT oldest categories, by category."""
     usual: Usual
 
     @staticmethod
@@ -187,13 +195,21 @@ class Comparison:
         cohort: Mapping[str, float],
         usual: Usual,
     ) -> Comparison:
-        """From the matches with members of these categories, shape (number of members,); `own_cohort` gives a member's, by its place."""
+        """From the burst's matches, shape (N,), with members, oldest first, of these categories.
+
+        `own_cohort`: gives the cohort of the member at a place, as of `Matched`; asked of the best matching members alone.
+        `cohort`, `usual`: as of the fields.
+        """
         best = best_members(categories, matches)
         matched = {category: [Matched(float(matches[place]), own_cohort(place)) for place in places] for category, places in best.items()}
         return Comparison(matched, cohort, usual)
 
     def ranked(self, without: str | None = None) -> list[tuple[str, float]]:
-        """(category, evidence) of the SHORTLIST best matching categories, most evidence first; as if `without` were not in the memory."""
+        """(category, evidence) of up to SHORTLIST categories, the best matching ones, most evidence first.
+
+        As if `without` were not in the memory, but that patches stay adapted to it too, and that no younger category takes its place in the
+        cohort.
+        """
         shortlist = [category for category in self.matched if category != without][:SHORTLIST]
         evidence = {category: self._evidence(category, {category, without}) for category in shortlist}
         return sorted(evidence.items(), key=lambda entry: (-entry[1], entry[0]))
@@ -208,7 +224,7 @@ class Comparison:
 
 
 def cohort_of(categories: Sequence[str]) -> dict[str, int]:
-    """The founders of the COHORT oldest categories, by category: places among members, whose categories these are, oldest first."""
+    """The founders of up to COHORT categories, the oldest, by category: places among members, oldest first, of these categories."""
     founders: dict[str, int] = {}
     for place, category in enumerate(categories):
         founders.setdefault(category, place)
@@ -216,8 +232,8 @@ def cohort_of(categories: Sequence[str]) -> dict[str, int]:
 
 
 def best_members(categories: Sequence[str], matches: FloatArray) -> dict[str, list[int]]:
-    """By category, best matching first and SHORTLIST + 1 of them, its MEMBERS best matching members: places among members of these
-    categories and with these matches, shape (number of members,)."""
+    """By category, best matching first, up to MEMBERS of its members, the best matching ones: places among members of these categories
+    and with these matches, shape (N,). Up to SHORTLIST + 1 categories."""
     best: dict[str, list[int]] = {}
     for place in np.argsort(-matches, kind="stable").tolist():
         if categories[place] in best or len(best) <= SHORTLIST:

@@ -9,17 +9,24 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.floating]
+from core.views import FloatArray
+
 Mask = NDArray[np.bool_]
 
 PLANE_TRIALS = 200
+"""Of RANSAC: planes through three points each."""
 PLANE_SAMPLE = 2000
 """Background points that the plane is fitted to."""
 MIN_PLANE_POINTS = 200
+"""Background points below which no support is looked for."""
+LEAST_NORMAL = 1e-12
+"""Length of the cross product of two sides, m², below which three points lie on one line and span no plane."""
 PLANE_TOLERANCE = 0.01
 """Inlier distance, as all lengths below a share of the window's width at the object's distance."""
 ON_PLANE = 0.02
+"""Nearer to the plane than this is the support, and voted down."""
 ABOVE_PLANE = 0.03
+"""Higher than this is off the support, and voted up; between the two a noisy plane tells nothing, and there is no vote."""
 MAX_HEIGHT = 1.5
 """Higher than this above the support is another surface."""
 FAR_BACKGROUND = 1.6
@@ -31,7 +38,7 @@ SMOOTHING = 7
 
 
 def otsu_threshold(soft: FloatArray) -> float:
-    """The threshold in [0, 1] that best splits `soft`'s histogram (Otsu 1979).
+    """The threshold in (0, 1] that best splits the histogram of `soft`, of any shape (Otsu 1979).
 
     A fixed threshold fails where the decoder is unsure of a whole object: its map is then low, but still flat and well above the rest.
     """
@@ -77,7 +84,8 @@ def fit_plane(points: FloatArray, tolerance_m: float) -> tuple[FloatArray, Float
     corners = kept[rng.integers(0, len(kept), (PLANE_TRIALS, 3))]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     length = np.linalg.norm(normals, axis=1)
-    normals, anchors = normals[length > 1e-12] / length[length > 1e-12, None], corners[length > 1e-12, 0]
+    spans = length > LEAST_NORMAL
+    normals, anchors = normals[spans] / length[spans, None], corners[spans, 0]
     near = np.abs(kept @ normals.T - (anchors * normals).sum(axis=1)) < tolerance_m
     inliers = kept[near[:, int(near.sum(axis=0).argmax())]]
     origin = inliers.mean(axis=0)

@@ -1,6 +1,6 @@
 """Many guesses of the transform, so that one of them is right: pooled, by consensus cluster, by view pair, by alignment.
 
-Letters: M reference views, N target views, T transforms.
+Letters: T transforms, S symmetries.
 """
 
 from __future__ import annotations

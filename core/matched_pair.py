@@ -1,6 +1,6 @@
 """A reference and a target, ready to be laid on each other: described in one basis, every view pair matched.
 
-Letters: M reference views, N target views, Q view pairs, P points.
+Letters: M reference views, N target views, Q view pairs, P patches of a view, C descriptor size.
 """
 
 from __future__ import annotations
@@ -97,7 +97,8 @@ class MatchedPair:
 
     @cached_property
     def steady_descriptors(self) -> tuple[list[FloatArray], list[FloatArray]]:
-        """Unit descriptors that change little from view to view, of each view's patches, of the reference and of the target."""
+        """Unit descriptors that change little from view to view, of the reference and of the target: one array a view, shape (P, C), of at
+        most STEADY_DIMS dimensions."""
         directions = discriminant_directions((self.reference, self.target), STEADY_DIMS)
         of_reference, of_target = (
             [unit(np.asarray((view.descriptors - self._basis.mean) @ directions, dtype=np.float32)) for view in views]
@@ -131,7 +132,7 @@ class MatchedPair:
 
 
 def describe(views: Sequence[EncodedView], reference: Described, dims: int | None) -> list[FloatArray]:
-    """Unit descriptors of each view's patches, along the reference's first `dims` components."""
+    """Unit descriptors along the reference's first `dims` components, of whole tokens for None: one array a view, shape (P, C)."""
     return [unit(view.descriptors if dims is None else reference.basis.project(view.descriptors, dims)) for view in views]
 
 

@@ -3,7 +3,7 @@
 Laid on the burst at their best poses, the candidates' references predict what would be seen from every side. A viewpoint is worth most
 where the predictions differ most and the burst has not looked yet.
 
-Letters: n viewpoints, K patches a view, D token size.
+Letters: n viewpoints.
 """
 
 from __future__ import annotations
@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from core.backbones.whitening import Whitening
 from core.camera_poses import angles_about_deg
@@ -22,8 +21,7 @@ from core.evidence import Adaptation, match_views, sample_patches, whitened
 from core.reference import Reference
 from core.scan import ScanOptions, request_scan
 from core.sim3 import Sim3
-
-FloatArray = NDArray[np.floating]
+from core.views import FloatArray
 
 OFFERED = 48
 """Viewpoints of the hemisphere that are compared."""
@@ -69,7 +67,7 @@ def _difference(places_m: FloatArray, center_m: FloatArray, candidates: Sequence
     for candidate in candidates:
         shown = [view for view in candidate.reference.views if len(view.cells)]
         if any(view.camera is None for view in shown):
-            raise InvalidInput("reference", "has a view without camera")
+            raise InvalidInput("reference", "has a view without camera: scan the category anew with K and world_from_camera")
         cameras = candidate.target_from_reference.apply(np.stack([view.camera.world_from_camera[:3, 3] for view in shown if view.camera]))
         patches = whitened(sample_patches(EncodedBurst(tuple(shown), candidate.reference.fingerprint)), whitening)
         units = Adaptation.none(patches.shape[-1]).directions(patches)

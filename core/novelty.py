@@ -52,9 +52,10 @@ class DecisionConfig:
 
     score: str = DEFAULT_SCORE
     threshold: float | None = None
-    """Least similarity of a known object, and no third answer; None leaves it to the rate, or to a paper score's own default."""
+    """Similarity above which an object is known, and else novel, with no third answer; None leaves it to the rate, or to a paper score's
+    own default."""
     false_known_rate: float = 0.01
-    """Of objects of no known category, how many may be called known; of score `best`."""
+    """Share of the objects of no known category that may be called known; of score `best`."""
     looks: int = 0
     """Views taken for no other reason than that the object was uncertain: with each there is less room for doubt. What is still not known
     from where it should differ most is the more likely novel, so the lower level rises; the upper one, which the rate is about, stays."""
@@ -84,19 +85,19 @@ class Decision:
     probability: float | None = None
     """Estimated, that the most similar category is right, at even odds beforehand."""
     verified: bool = False
-    """Whether poses of the shortlist took part."""
+    """Whether poses took part, of up to VERIFIED categories."""
     rival: float | None = None
     """Similarity of the best wrong category, as far as the decision tells which is wrong: what later thresholds are made of.
     Of an uncertain one what is more probable counts: leaving these out would leave out the most similar of unknown objects."""
 
     @property
     def similarity(self) -> float | None:
-        """Of the most similar category."""
+        """Of the most similar category; None of an empty memory."""
         return self.similarities[0][1] if self.similarities else None
 
     @property
     def margin(self) -> float | None:
-        """By how much the most similar category leads."""
+        """By how much the most similar category leads; None where there is no other."""
         return self.similarities[0][1] - self.similarities[1][1] if len(self.similarities) > 1 else None
 
     @property
@@ -105,7 +106,11 @@ class Decision:
         return tuple(category for category, similarity in self.similarities if similarity > self.uncertain_above)
 
     def corrected(self, category_id: str) -> Decision:
-        """With the rival that it would have, had it known that the burst is of this category; a paper score has none."""
+        """With the best of the other categories for its rival, now that the burst is known to be of this one; a paper score has none.
+
+        As they were ranked, this one among them: its match with the burst is part of their cohort, so the rival is somewhat smaller than
+        one that was found without it.
+        """
         wrong = [similarity for category, similarity in self.similarities if category != category_id]
         return replace(self, rival=max(wrong, default=None) if self.score == BEST else None)
 
@@ -127,7 +132,8 @@ def decide(
 ) -> Decision:
     """The most similar category if it is similar enough; uncertain where that cannot be told; else novel.
 
-    An empty memory finds everything novel. Members without patches are no part of `best`; enrolled ones serve no other score.
+    An empty memory finds everything novel. Members without patches are no part of `best`; enrolled ones serve no other score, and bring
+    their own whitening.
     """
     config = config or DecisionConfig()
     if config.score == BEST:

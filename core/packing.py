@@ -1,6 +1,20 @@
 """Encoded views as plain arrays and back: for npz files, never pickled.
 
-Letters: V views, P foreground patches of a view, D token size.
+    fingerprint        ()         str       the backbone's
+    counts             (V,)       int64     foreground patches of each view
+    grid               (V,)       int64     patches a side of each view's close crop
+    window             (V, 3)     int64     x0, y0 and size of each view's close crop
+    cells              (N, 2)     int16     of the patches of all views, one view after the other
+    descriptors        (N, D)     float16
+    points_m           (N, 3)     float32
+    saliency           (V, G, G)  float16
+    cls, pooled        (V, D)     float32
+    K                  (V, 3, 3)  float     NaN where a view has no camera
+    world_from_camera  (V, 4, 4)  float     the same
+
+What each means is said at `core.encode.EncodedView`.
+
+Letters: V views, N foreground patches of all views, D token size, G patches a side.
 """
 
 from __future__ import annotations
@@ -17,10 +31,11 @@ from core.views import Camera
 
 Arrays = Mapping[str, NDArray[Any]]
 NO_CAMERA = np.full((4, 4), np.nan)
+"""Stands for the matrices of a view without camera."""
 
 
 def burst_as_arrays(encoded: EncodedBurst) -> dict[str, NDArray[Any]]:
-    """Everything but the timings; the patches of all views are concatenated, tokens and saliency in half precision."""
+    """Everything but the timings, by the names above; tokens and saliency in half precision."""
     views = encoded.views
     return {
         "fingerprint": np.array(encoded.fingerprint),

@@ -1,6 +1,6 @@
 """A reference: what is kept of the one object that a category was learnt from.
 
-Letters: M views, P foreground patches of a view, D token size, N cloud points.
+Letters: N cloud points, S symmetries.
 """
 
 from __future__ import annotations

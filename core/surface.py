@@ -47,5 +47,5 @@ class Surface:
         return inliers(self.points_m)
 
     def draw(self, count: int, seed: int) -> NDArray[np.intp]:
-        """Indices of up to `count` random points without outliers."""
+        """Indices of random points, shape (up to count,), none of them an outlier."""
         return np.random.default_rng(seed).permutation(self._inliers)[:count]

@@ -3,7 +3,7 @@
 A point of the object is seen by the other views, too, or something of the object hides it there. Of what else a picture shows, a hand, an
 arm, table and room, things around, another view sees that it is not there, or sees it away from what it takes for the object.
 
-Letters: V views, P foreground patches of a view, N of all views, G patches a side.
+Letters: P foreground patches of a view, N of all views.
 """
 
 from __future__ import annotations

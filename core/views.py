@@ -1,6 +1,6 @@
 """Cameras, views and bursts: frozen, and checked when they are made.
 
-Letters: H, W image height and width in pixels; V views.
+Letters: H, W image height and width in pixels.
 Camera axes are OpenCV's (x right, y down, z forward); lengths are metres.
 """
 
@@ -17,10 +17,19 @@ from core.errors import InvalidInput
 FloatArray = NDArray[np.floating]
 ROTATION_TOLERANCE = 1e-3
 """Largest entry of |RᵀR − I| that still counts as a rotation (float32 JSON round trips reach about 1e-6)."""
+ENTRY_TOLERANCE = 1e-6
+"""How far an entry of K or of a pose may be off the 0 or 1 that it must be: as far as such round trips put it."""
 MAX_DEPTH_M = 100.0
 """No indoor RGB-D camera measures farther; larger values are millimetres sent as metres."""
+MIN_DEPTH_M = 0.01
+"""No RGB-D camera measures nearer; smaller values were made by a depth_scale of another unit."""
 MAX_PIXELS = 16_000_000
 """Largest image accepted, in pixels."""
+MIN_SIDE = 32
+"""Least height and width accepted, in pixels: about one for each patch of a close crop, below which there is nothing to see."""
+MAX_OFF_CENTRE = 0.2
+"""How far the principal point may be off the image's centre, as a share of its width or height: a lens sits within a few hundredths, and K
+of an image of half the size puts it a quarter off."""
 
 
 def require_rotation(rotation: FloatArray, field: str) -> None:
@@ -55,9 +64,9 @@ class Camera:
             if not np.isfinite(value).all():
                 raise InvalidInput(f"{field}.{name}", "has NaN or infinite entries")
         K, pose = self.K, self.world_from_camera
-        if K[0, 0] <= 0 or K[1, 1] <= 0 or not np.allclose(K[2], [0, 0, 1], atol=1e-6) or abs(K[1, 0]) > 1e-6:
+        if K[0, 0] <= 0 or K[1, 1] <= 0 or not np.allclose(K[2], [0, 0, 1], atol=ENTRY_TOLERANCE) or abs(K[1, 0]) > ENTRY_TOLERANCE:
             raise InvalidInput(f"{field}.K", "expected [[fx, s, cx], [0, fy, cy], [0, 0, 1]] in pixels with fx, fy > 0")
-        if not np.allclose(pose[3], [0, 0, 0, 1], atol=1e-6):
+        if not np.allclose(pose[3], [0, 0, 0, 1], atol=ENTRY_TOLERANCE):
             raise InvalidInput(f"{field}.world_from_camera", f"its last row must be [0, 0, 0, 1], found {np.round(pose[3], 4).tolist()}")
         require_rotation(pose[:3, :3], f"{field}.world_from_camera")
 
@@ -78,7 +87,7 @@ class Camera:
         return self.in_camera(pixels, depth_m) @ self.world_from_camera[:3, :3].T + self.world_from_camera[:3, 3]
 
     def in_camera(self, pixels: FloatArray, depth_m: FloatArray) -> FloatArray:
-        """As `back_project`, but in the camera's frame."""
+        """Points in the camera's frame, shape (..., 3), of pixels (x, y), shape (..., 2), at z-depths in metres, shape (...)."""
         y = (pixels[..., 1] - self.K[1, 2]) / self.K[1, 1]
         x = (pixels[..., 0] - self.K[0, 2] - self.K[0, 1] * y) / self.K[0, 0]
         return np.stack([x * depth_m, y * depth_m, depth_m], axis=-1)
@@ -118,9 +127,10 @@ class View:
         if self.rgb.ndim != 3 or self.rgb.shape[2] != 3 or self.rgb.dtype != np.uint8:
             raise InvalidInput(f"{field}.rgb", f"expected (H, W, 3) of uint8, found {self.rgb.shape} of {self.rgb.dtype}")
         height, width = self.size
-        if min(height, width) < 32 or height * width > MAX_PIXELS:
+        if min(height, width) < MIN_SIDE or height * width > MAX_PIXELS:
             raise InvalidInput(
-                f"{field}.rgb", f"is {width}×{height} pixels; expected at least 32 a side and at most {MAX_PIXELS // 1_000_000} megapixels"
+                f"{field}.rgb",
+                f"is {width}×{height} pixels; expected at least {MIN_SIDE} a side and at most {MAX_PIXELS // 1_000_000} megapixels",
             )
         if self.camera is not None:
             self.camera.validate(field)
@@ -130,7 +140,7 @@ class View:
                     f"{field}.K",
                     f"its principal point ({cx:.0f}, {cy:.0f}) is outside the {width}×{height} image; scale K to this resolution",
                 )
-            if max(abs(cx / width - 0.5), abs(cy / height - 0.5)) > 0.2:
+            if max(abs(cx / width - 0.5), abs(cy / height - 0.5)) > MAX_OFF_CENTRE:
                 raise InvalidInput(
                     f"{field}.K",
                     f"its principal point ({cx:.0f}, {cy:.0f}) is far from the centre of the {width}×{height} image: K is of another size",
@@ -161,7 +171,7 @@ class View:
         median = float(np.median(measured))
         if median > MAX_DEPTH_M:
             raise InvalidInput(f"{field}.depth", f"its median is {median:.0f} m: millimetres sent as metres? Set depth_scale to 0.001")
-        if median < 0.01:
+        if median < MIN_DEPTH_M:
             raise InvalidInput(
                 f"{field}.depth", f"its median is {median * 1000:.2g} mm: depth_scale is metres a unit, so 0.001 for millimetre images"
             )

@@ -23,6 +23,7 @@ from core.errors import Unavailable
 IMAGENET_MEAN = (0.485, 0.456, 0.406)
 IMAGENET_DEVIATION = (0.229, 0.224, 0.225)
 PREPROCESSING = "rgb-imagenet-1"
+"""Part of the fingerprint; to be changed whenever pixels reach the network otherwise, which makes other tokens of the same image."""
 MATCHING_LAYER = 9
 """Block, counted from 0, whose tokens serve as descriptors. The embedded weights' last block was fine-tuned for
 saliency; block 9 of 12 matched best across instances, and serves the paper's DINO as well (Amir et al. 2021)."""
@@ -136,7 +137,10 @@ class DinoBackbone:
 
 
 def passes(images: int, tokens: int, device: str, batch: int = BATCH) -> list[NDArray[np.intp]]:
-    """Which of so many images, of so many tokens each, share a pass: up to `batch`, and on a CPU no more than its cache holds."""
+    """Which of so many images, of so many tokens each, share a pass: their indices, one array a pass.
+
+    Up to `batch`, and on a CPU no more than its cache holds.
+    """
     together = min(batch, max(1, CACHED_TOKENS // tokens)) if torch.device(device).type == "cpu" else batch
     return np.array_split(np.arange(images), -(-images // together))
 

@@ -1,6 +1,6 @@
 """Whitening of tokens: what all images share is taken out, so that what is left tells categories apart.
 
-Letters: N tokens, D token size.
+Letters: N tokens, D token size; * is any batch shape.
 """
 
 from __future__ import annotations
@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.floating]
+from core.views import FloatArray
+
 SHRINKAGE = 3.0
 """Isotropic variance added, in units of the mean variance: directions of little variance are not blown up."""
 STATISTICS = Path(__file__).parent / "statistics"
@@ -51,5 +51,5 @@ class Whitening:
         return file
 
     def apply(self, tokens: FloatArray) -> FloatArray:
-        """Whitened tokens, shape (N, D) or (D,)."""
+        """Whitened tokens, shape (*, D)."""
         return (tokens - self.mean) @ self.matrix

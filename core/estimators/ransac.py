@@ -1,4 +1,7 @@
-"""RANSAC with Umeyama's similarity on four points, all trials in one batch (paper, "Final pose estimation")."""
+"""RANSAC with Umeyama's similarity on four points, all trials in one batch (paper, "Final pose estimation").
+
+Letters: K correspondences, T trials that determine a similarity.
+"""
 
 from __future__ import annotations
 
@@ -16,6 +19,7 @@ from core.sim3 import Sim3, umeyama
 from core.views import FloatArray
 
 TRIALS = 1000
+"""Samples of four correspondences."""
 REFITS = 3
 """Rounds of least squares on the inliers."""
 
@@ -54,7 +58,10 @@ def _without_repeats(rng: np.random.Generator, trials: int, count: int) -> NDArr
 
 def polish(source: FloatArray, target: FloatArray, transform: Sim3, inlier: NDArray[np.bool_], threshold_m: float) -> RobustFit:
     """Least squares on the inliers while that lowers the squared errors, each of at most the threshold's: a transform that is bent to
-    reach one more inlier has more of them, and is worse."""
+    reach one more inlier has more of them, and is worse.
+
+    `source` and `target`: shape (K, 3); `inlier`, of the transform to begin with: shape (K,).
+    """
     cost = (np.minimum(errors_m(transform, source, target), threshold_m) ** 2).sum()
     for _ in range(REFITS):
         try:

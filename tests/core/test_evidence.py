@@ -62,7 +62,7 @@ def test_only_the_oldest_categories_are_the_cohort() -> None:
     generator = torch.Generator().manual_seed(0)
     patches = [torch.nn.functional.normalize(torch.randn(2, 3, 6, generator=generator), dim=-1) for _ in range(COHORT + 20)]
     entries = [Entry(f"{index}", each) for index, each in enumerate(patches)]
-    far = [Entry(entry.category_id, -patches[0][:1, :1]) for entry in entries[COHORT:]]
+    far = [Entry(entry.category_id, -patches[0][:1]) for entry in entries[COHORT:]]
     asked = patches[3] + 0.01
     found = [dict(Comparison.between(asked, entries[:COHORT] + rest, USUAL).ranked())["3"] for rest in ([], far, entries[COHORT:])]
     assert found[1:] == pytest.approx([found[0]] * 2)
@@ -107,6 +107,13 @@ def test_a_category_left_out_is_as_if_it_were_not_there() -> None:
     entries = [Entry(f"{axis}", views([axis, (axis + 1) % 6])) for axis in range(4)]
     asked = views([0, 1])
     assert Comparison.between(asked, entries, USUAL).ranked(without="0") == Comparison.between(asked, entries[1:], USUAL).ranked()
+
+
+def test_a_memory_of_one_category_is_judged_by_what_ships() -> None:
+    """One view a side, one member, no other category; and with the only one left out there is nothing to rank."""
+    alone = Comparison.between(views([0, 1]), [Entry("only", views([0, 2]))], USUAL)
+    assert alone.ranked() == [("only", pytest.approx(0.5 - (USUAL.mean + DEVIATIONS * USUAL.deviation)))]
+    assert alone.ranked(without="only") == []
 
 
 def test_patches_are_drawn_the_same_way_every_time_from_views_that_show_something(painted: PaintedObject) -> None:
