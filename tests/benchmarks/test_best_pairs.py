@@ -29,7 +29,7 @@ def patches() -> list[torch.Tensor]:
 
 @pytest.fixture
 def pairs(patches: list[torch.Tensor]) -> BestPairs:
-    """Of these, the same at every stage."""
+    """Of these bursts, with the same matches at every stage."""
     match = np.stack([match_views(each, patches) for each in patches])
     agreement = np.random.default_rng(0).uniform(0, 0.3, match.shape)
     np.fill_diagonal(agreement, np.nan)
@@ -37,7 +37,7 @@ def pairs(patches: list[torch.Tensor]) -> BestPairs:
 
 
 def filled(source: BestSource) -> np.ndarray:
-    """A memory with the categories of CHOSEN; returns the number of them."""
+    """Fills one memory with the categories of CHOSEN; returns the number of them, shape (1,)."""
     source.begin(1)
     for burst, category in enumerate(CHOSEN):
         source.learn(burst, np.array([category]), np.array([0]))

@@ -23,6 +23,7 @@ WHITENING = Whitening.fit(np.random.default_rng(2).normal(size=(500, DIM)) * np.
 
 
 def tokens(kind: int, seed: int) -> np.ndarray:
+    """Patches of an instance of a kind of thing, shape (VIEWS, PATCHES, DIM)."""
     rng = np.random.default_rng([kind, seed])
     return ROOM[kind] + 0.3 * rng.normal(size=DIM) + 0.8 * rng.normal(size=(VIEWS, PATCHES, DIM))
 
@@ -31,7 +32,7 @@ class Kept:
     """Members in memory that note what is asked for."""
 
     def __init__(self, members: Sequence[tuple[str, int, int]]) -> None:
-        """(id, kind, seed)"""
+        """Of each its id, and the kind and seed of its tokens."""
         self.of = {name: (kind, seed) for name, kind, seed in members}
         self.merged: dict[str, int] = {}
         """Into which kind's category."""
@@ -61,6 +62,7 @@ class Kept:
 
 
 def one_each(kinds: int) -> Kept:
+    """So many categories of one member each."""
     return Kept([(f"m{kind}", kind, 0) for kind in range(kinds)])
 
 
@@ -69,8 +71,8 @@ def seen(painted: PaintedObject) -> Callable[[int, int], EncodedBurst]:
     return lambda kind, seed: painted.with_tokens(tokens(kind, seed))
 
 
-def same(kept: Kept, enrolled: Enrolled, burst: EncodedBurst) -> None:
-    """That a decision is the exact rule's, number by number."""
+def check_exact(kept: Kept, enrolled: Enrolled, burst: EncodedBurst) -> None:
+    """Asserts that a decision is the exact rule's, number by number."""
     ours, rule = decide(enrolled, burst), decide(kept.members(), burst, context=Context(WHITENING))
     assert [category for category, _ in ours.similarities] == [category for category, _ in rule.similarities]
     np.testing.assert_allclose([each for _, each in ours.similarities], [each for _, each in rule.similarities], atol=2e-5)
@@ -81,20 +83,26 @@ def test_a_small_memory_is_decided_by_the_exact_rule_while_it_changes(seen: Call
     kept = Kept([(f"m{kind}-{seed}", kind, seed) for kind in range(8) for seed in range(2)])
     enrolled = Enrolled(kept, WHITENING)
     for kind in range(0, 12, 3):
-        same(kept, enrolled, seen(kind, 9))
+        check_exact(kept, enrolled, seen(kind, 9))
     kept.of["new"] = (20, 0)
-    same(kept, enrolled, seen(20, 9))
+    check_exact(kept, enrolled, seen(20, 9))
     kept.of["another"] = (2, 5)
     del kept.of["m0-0"]
-    same(kept, enrolled, seen(2, 9))
+    check_exact(kept, enrolled, seen(2, 9))
     kept.merged["m3-0"] = 4
-    same(kept, enrolled, seen(4, 9))
+    check_exact(kept, enrolled, seen(4, 9))
     assert enrolled.exact
 
 
 def test_at_the_last_exact_size_nothing_is_approximate(seen: Callable[[int, int], EncodedBurst]) -> None:
     kept = one_each(EXACT)
-    same(kept, Enrolled(kept, WHITENING), seen(40, 9))
+    check_exact(kept, Enrolled(kept, WHITENING), seen(40, 9))
+
+
+def test_a_memory_of_one_member_is_decided_by_the_exact_rule(seen: Callable[[int, int], EncodedBurst]) -> None:
+    kept = one_each(1)
+    for kind in (0, 1):
+        check_exact(kept, Enrolled(kept, WHITENING), seen(kind, 9))
 
 
 def test_an_empty_memory_finds_everything_novel(seen: Callable[[int, int], EncodedBurst]) -> None:
@@ -132,6 +140,12 @@ def test_what_is_damaged_is_left_out_and_the_rest_goes_on(seen: Callable[[int, i
         found = dict(decide(Enrolled(kept, WHITENING), seen(7, 9)).similarities)
         assert "kind 7" not in found
         assert len(found) == 5
+
+
+def test_a_memory_all_of_which_is_damaged_finds_everything_novel(seen: Callable[[int, int], EncodedBurst]) -> None:
+    kept = one_each(3)
+    kept.damaged = set(kept.of)
+    assert decide(Enrolled(kept, WHITENING), seen(1, 9)).outcome == "novel"
 
 
 def test_a_restarted_service_decides_the_same(seen: Callable[[int, int], EncodedBurst]) -> None:

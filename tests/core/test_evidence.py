@@ -28,7 +28,7 @@ USUAL = Usual(0.2, 0.05)
 
 
 def views(*patches: list[int]) -> torch.Tensor:
-    """One view for each list, whose patches are the axes named."""
+    """One view for each list, whose patches are the axes of these numbers, shape (V, K, 6)."""
     return torch.stack([AXES[each] for each in patches])
 
 
