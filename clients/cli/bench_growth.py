@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -54,18 +55,10 @@ def _measure(probe: Probe) -> GrowthRow:
     from benchmarks.growth import GrowthRow
     from core.backbones import EMBEDDED
     from core.backbones.whitening import Whitening
-    from core.enrolled import NEAREST
-    from service.compute import Solver
-    from service.judgement import Judge
     from store.memory import Memory
 
     whitening = Whitening.shipped(EMBEDDED)
-
-    def decide(memory: Memory, burst: EncodedBurst) -> Decision:
-        from core.novelty import DecisionConfig
-
-        return Judge(memory, burst, whitening, Solver()).judge(DecisionConfig()).decision
-
+    decide = partial(_decide, whitening)
     with TemporaryDirectory() as folder, Memory.open(Path(folder)) as empty:  # loads what any decision needs
         _insert(Path(folder), [probe.novel])
         decide(empty, probe.novel)
@@ -79,24 +72,19 @@ def _measure(probe: Probe) -> GrowthRow:
         again = [_timed(partial(decide, memory, burst)) for burst in probe.known]
         store = [_timed(lambda: (memory.instances.listed(), memory.observations.decisions(PAST)))[0] for _ in probe.known]
         after = _resident_mb()
-        members = memory.instances.listed()
-        near = _nearness(memory)
-        nearest = [_timed(partial(near.nearest, burst.pooled.mean(axis=0)[None], NEAREST))[0] for burst in probe.known]
-        decisions = [decision for _, decision in again]
-        names = [members[category].category_id for category in probe.right]
-        exact = _exact(memory, probe, whitening) if probe.exact else None
+        categories = len(memory.instances.listed())
+        nearest = _nearest_ms(memory, probe)
+        answers = _answers(memory, probe, [decision for _, decision in again], whitening)
         few = memory.instances.enrolled(whitening).exact
-        _insert(probe.folder, [probe.novel])
-        learnt, _ = _timed(partial(decide, memory, probe.known[-1]))
-        memory.categories.delete(memory.instances.listed()[-1].category_id)
-    times = [seconds for seconds, _ in again]
+        learnt = _learnt_ms(memory, probe, decide)
+    times = [milliseconds for milliseconds, _ in again]
     return GrowthRow(
-        categories=len(members),
+        categories=categories,
         exact=few,
         decide_ms=float(np.median(times)),
         least_ms=min(times),
         p95_ms=float(np.percentile(times, 95)),
-        nearest_ms=float(np.median(nearest)),
+        nearest_ms=nearest,
         store_ms=float(np.median(store)),
         new_ms=float(np.median(fresh)),
         learnt_ms=learnt,
@@ -106,10 +94,62 @@ def _measure(probe: Probe) -> GrowthRow:
         first_read_mb=first_read - read,
         file_mb=sum(file.stat().st_size for file in probe.folder.glob("memory.sqlite3*")) / MEGABYTE,
         resident_mb=after - resident,
-        right=float(np.mean([decision.similarities[0][0] == name for decision, name in zip(decisions, names)])),
-        recall=None if exact is None else float(np.mean([d.similarities[0][0] == e[0] for d, e in zip(decisions, exact)])),
-        evidence_off=None if exact is None else float(np.mean([abs(d.similarities[0][1] - e[1]) for d, e in zip(decisions, exact)])),
-        exact_spread=None if exact is None else float(np.std([similarity for _, similarity in exact])),
+        right=answers.right,
+        recall=answers.recall,
+        evidence_off=answers.evidence_off,
+        exact_spread=answers.exact_spread,
+    )
+
+
+def _decide(whitening: Any, memory: Memory, burst: EncodedBurst) -> Decision:
+    from core.novelty import DecisionConfig
+    from service.compute import Solver
+    from service.judgement import Judge
+
+    return Judge(memory, burst, whitening, Solver()).judge(DecisionConfig()).decision
+
+
+def _nearest_ms(memory: Memory, probe: Probe) -> float:
+    import numpy as np
+
+    from core.enrolled import NEAREST
+
+    near = _nearness(memory)
+    return float(np.median([_timed(partial(near.nearest, burst.pooled.mean(axis=0)[None], NEAREST))[0] for burst in probe.known]))
+
+
+def _learnt_ms(memory: Memory, probe: Probe, decide: Callable[[Memory, EncodedBurst], Decision]) -> float:
+    """The category is gone afterwards."""
+    _insert(probe.folder, [probe.novel])
+    milliseconds, _ = _timed(partial(decide, memory, probe.known[-1]))
+    memory.categories.delete(memory.instances.listed()[-1].category_id)
+    return milliseconds
+
+
+@dataclass(frozen=True)
+class _Answers:
+    """See `GrowthRow`."""
+
+    right: float
+    recall: float | None = None
+    evidence_off: float | None = None
+    exact_spread: float | None = None
+
+
+def _answers(memory: Memory, probe: Probe, decisions: Sequence[Decision], whitening: Any) -> _Answers:
+    import numpy as np
+
+    members = memory.instances.listed()
+    found = [decision.similarities[0] for decision in decisions]
+    right = float(np.mean([each[0] == members[category].category_id for each, category in zip(found, probe.right)]))
+    if not probe.exact:
+        return _Answers(right)
+    exact = _exact(memory, probe, whitening)
+    return _Answers(
+        right,
+        recall=float(np.mean([each[0] == best[0] for each, best in zip(found, exact)])),
+        evidence_off=float(np.mean([abs(each[1] - best[1]) for each, best in zip(found, exact)])),
+        exact_spread=float(np.std([similarity for _, similarity in exact])),
     )
 
 
