@@ -108,11 +108,14 @@ class Decision:
     def corrected(self, category_id: str) -> Decision:
         """With the best of the other categories for its rival, now that the burst is known to be of this one; a paper score has none.
 
-        As they were ranked, this one among them: its match with the burst is part of their cohort, so the rival is somewhat smaller than
-        one that was found without it.
+        What was found without this category stays. Else the others count as they were ranked, this one among them: its match with the
+        burst is part of their cohort, so the rival is somewhat smaller than one that was found without it.
         """
-        wrong = [similarity for category, similarity in self.similarities if category != category_id]
-        return replace(self, rival=max(wrong, default=None) if self.score == BEST else None)
+        if self.score != BEST:
+            return replace(self, rival=None)
+        if self.similarities and self.similarities[0][0] == category_id and self.rival not in (None, self.similarity):
+            return self
+        return replace(self, rival=max((similarity for category, similarity in self.similarities if category != category_id), default=None))
 
 
 @dataclass(frozen=True, eq=False)

@@ -193,8 +193,14 @@ def test_an_impossible_rate_is_refused(rate: float) -> None:
         DecisionConfig(false_known_rate=rate)
 
 
+def test_a_decision_that_was_right_keeps_the_rival_it_found_without_the_right_category(painted: PaintedObject) -> None:
+    decision = decide(SIX_KINDS, seen(painted, 2, 9))
+    assert decision.corrected("kind 2").rival == decision.rival > decision.similarities[1][1]
+
+
 def test_a_corrected_decision_has_the_best_of_the_others_as_its_rival() -> None:
     decided = Decision("known", "best", 0.3, (("cup", 0.5), ("bowl", 0.4), ("vase", 0.1)), rival=0.4)
     assert [decided.corrected(said).rival for said in ("cup", "bowl", "a new one")] == [0.4, 0.5, 0.5]
+    assert replace(decided, outcome="novel", rival=0.5).corrected("cup").rival == 0.4
     assert Decision("novel", "best", 0.3, ()).corrected("cup").rival is None
     assert replace(decided, score="paper_mean").corrected("cup").rival is None
