@@ -19,6 +19,8 @@ from store.retention import Retention
 
 SMALLEST_RATE = 1e-4
 """Of false answers that may be asked for: how rare rarer ones are, some hundreds of decisions do not tell."""
+MOST_VIEWPOINTS = 64
+"""Of one scan."""
 
 
 class Settings(BaseSettings):
@@ -57,7 +59,7 @@ class Settings(BaseSettings):
     solvers: int = Field(2, gt=0, description="Processes that solve poses, of `onelook serve --cluster`.")
     max_views: int = Field(32, gt=0, description="Most views in one burst.")
     max_megapixels: int = Field(128, gt=0, description="Most pixels of a burst, all views together; decoded, each takes 8 to 16 bytes.")
-    scan_views: int = Field(10, ge=2, le=64, description="Viewpoints that a scan asks for.")
+    scan_views: int = Field(10, ge=2, le=MOST_VIEWPOINTS, description="Viewpoints that a scan asks for.")
     scan_expiry_h: float = Field(24, gt=0, description="Hours after which a scan expires that no views come for.")
     keep_observations: int = Field(1000, gt=0, description="Observations kept, with their views; the oldest are dropped.")
     undo_days: float = Field(30, ge=0, description="Days for which a rename, merge, split or deletion can be undone.")

@@ -13,9 +13,8 @@ from service.scanning import Progress
 from service.schemas.fields import CreatedAt, Name
 from service.schemas.geometry import Direction, Matrix4, Vector3, as_up
 from service.schemas.quality import Fault
+from service.settings import MOST_VIEWPOINTS
 from store import records
-
-MOST_VIEWPOINTS = 64
 
 
 class ReceivedView(BaseModel):
