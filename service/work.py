@@ -69,8 +69,8 @@ class WorkQueue:
 
     @property
     def waiting(self) -> int:
-        """Pieces that wait."""
-        return self._pending - len(self._running)
+        """Pieces that wait: those beyond what the workers take at once."""
+        return max(self._pending - self._workers, 0)
 
     @property
     def writing(self) -> bool:
