@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.pair_scores import PairScores
+from benchmarks.parallel import bar
 from clients.datasets import folders
 from core.views import FloatArray
 
@@ -174,12 +175,13 @@ def nearest_category(source: Source, labels: NDArray[np.intp]) -> float:
     rng = np.random.default_rng(0)
     asked = np.flatnonzero(np.bincount(labels)[labels] > 1)
     right = 0
-    for burst in np.tile(asked, ORDERS):
-        source.begin(1)
-        for other in rng.permutation(np.delete(np.arange(len(labels)), burst)):
-            source.learn(int(other), labels[[other]], np.array([0]))
-        chosen, _ = source.nearest(int(burst), labels.max(keepdims=True) + 1)
-        right += int(chosen[0] == labels[burst])
+    with bar() as progress:
+        for burst in progress.track(np.tile(asked, ORDERS), description="asking who is nearest"):
+            source.begin(1)
+            for other in rng.permutation(np.delete(np.arange(len(labels)), burst)):
+                source.learn(int(other), labels[[other]], np.array([0]))
+            chosen, _ = source.nearest(int(burst), labels.max(keepdims=True) + 1)
+            right += int(chosen[0] == labels[burst])
     return right / (ORDERS * len(asked))
 
 

@@ -100,31 +100,28 @@ class Enrolled:
     def _compare(self, target: EncodedBurst, usual: Usual) -> Comparison:
         self._adapt()
         near = self._near
-        founders = dict(islice(near.founders.items(), COHORT))
         if self.exact:
             chosen = list(range(len(near)))
         else:
             ((closest, of_near),) = near.nearest(target.pooled.mean(axis=0)[None], NEAREST)
-            chosen = sorted({*closest, *of_near, *founders.values()})
+            chosen = sorted({*closest, *of_near, *islice(near.founders.values(), COHORT)})
         found = match_views(self._directions([sample_patches(target)])[0], self._prepared(chosen))
-        matches = dict(zip(chosen, found.tolist()))
         return Comparison.of(
             [near.members[place].category_id for place in chosen],
             found,
-            lambda index: self._cohort_of(chosen[index], founders),
-            {category: matches[place] for category, place in founders.items()},
+            lambda index, founders: self._with_founders(chosen[index], [chosen[each] for each in founders]),
             usual,
         )
 
-    def _cohort_of(self, place: int, founders: Mapping[str, int]) -> dict[str, float]:
-        """A member's matches with the founders, by category; each is compared once."""
+    def _with_founders(self, place: int, founders: Sequence[int]) -> list[float]:
+        """A member's matches with founders; each is compared once."""
         members = self._near.members
         known = self._cohorts.keep(members[place].id, self._cohorts.get(members[place].id, {}))
-        missing = [each for each in founders.values() if members[each].id not in known]
+        missing = [each for each in founders if members[each].id not in known]
         if missing:
             matches = match_views(self._prepared([place])[0], self._prepared(missing))
             known.update(zip((members[each].id for each in missing), matches.tolist()))
-        return {category: known[members[each].id] for category, each in founders.items()}
+        return [known[members[each].id] for each in founders]
 
     def _prepared(self, places: Sequence[int]) -> list[Tensor]:
         """Unit patches of some members, adapted to the memory, each (V, K, D). Raises _DamagedError."""

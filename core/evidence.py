@@ -178,31 +178,28 @@ class Comparison:
         `target`: unit patches, adapted to the same memory, shape (V, K, D).
         """
         found = match_views(target, [entry.patches for entry in entries])
-        founders = cohort_of([entry.category_id for entry in entries])
-        of_founders = [entries[index].patches for index in founders.values()]
 
-        def own_cohort(place: int) -> dict[str, float]:
-            return dict(zip(founders, match_views(entries[place].patches, of_founders).tolist()))
+        def of_member(place: int, founders: Sequence[int]) -> list[float]:
+            return match_views(entries[place].patches, [entries[founder].patches for founder in founders]).tolist()
 
-        cohort = {category: float(found[place]) for category, place in founders.items()}
-        return Comparison.of([entry.category_id for entry in entries], found, own_cohort, cohort, usual)
+        return Comparison.of([entry.category_id for entry in entries], found, of_member, usual)
 
     @staticmethod
     def of(
-        categories: Sequence[str],
-        matches: FloatArray,
-        own_cohort: Callable[[int], Mapping[str, float]],
-        cohort: Mapping[str, float],
-        usual: Usual,
+        categories: Sequence[str], matches: FloatArray, of_member: Callable[[int, Sequence[int]], Sequence[float]], usual: Usual
     ) -> Comparison:
-        """From the burst's matches, shape (N,), with members, oldest first, of these categories.
+        """From the burst's matches, shape (N,), with members, oldest first, of these categories: all there are, or some with the cohort.
 
-        `own_cohort`: gives the cohort of the member at a place, as of `Matched`; asked of the best matching members alone.
-        `cohort`, `usual`: as of the fields.
+        `of_member`: gives the matches of the member at a place with the founders at others; asked of the best matching members alone.
         """
-        best = best_members(categories, matches)
-        matched = {category: [Matched(float(matches[place]), own_cohort(place)) for place in places] for category, places in best.items()}
-        return Comparison(matched, cohort, usual)
+        founders = cohort_of(categories)
+        places = list(founders.values())
+
+        def matched(place: int) -> Matched:
+            return Matched(float(matches[place]), dict(zip(founders, of_member(place, places))))
+
+        best = {category: [matched(place) for place in members] for category, members in best_members(categories, matches).items()}
+        return Comparison(best, dict(zip(founders, matches[places].tolist())), usual)
 
     def ranked(self, without: str | None = None) -> list[tuple[str, float]]:
         """(category, evidence) of up to SHORTLIST categories, the best matching ones, most evidence first.

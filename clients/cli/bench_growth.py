@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -144,7 +144,7 @@ def _answers(memory: Memory, probe: Probe, decisions: Sequence[Decision], whiten
     right = float(np.mean([each[0] == members[category].category_id for each, category in zip(found, probe.right)]))
     if not probe.exact:
         return _Answers(right)
-    exact = _exact(memory, probe, whitening)
+    exact = exact_best(memory, probe.known, whitening)
     return _Answers(
         right,
         recall=float(np.mean([each[0] == best[0] for each, best in zip(found, exact)])),
@@ -153,43 +153,39 @@ def _answers(memory: Memory, probe: Probe, decisions: Sequence[Decision], whiten
     )
 
 
-def _exact(memory: Memory, probe: Probe, whitening: Any) -> list[tuple[str, float]]:
-    """The most similar category and its similarity, with every member compared patch by patch."""
+def exact_best(memory: Memory, bursts: Sequence[EncodedBurst], whitening: Any) -> list[tuple[str, float]]:
+    """The most similar category of each burst and its similarity, with every member compared patch by patch."""
     import numpy as np
 
     from core.calibration import Prior
     from core.enrolled import adapted_from
-    from core.evidence import Adaptation, Comparison, cohort_of, match_views, sample_patches, whitened
+    from core.evidence import Adaptation, Comparison, match_views, sample_patches, whitened
 
     members = memory.instances.listed()
     sample = [members[place].id for place in adapted_from(len(members))]
     read = memory.instances.patches(sample)
     adaptation = Adaptation.fit([whitened(read[each], whitening) for each in sample])
-    targets = [adaptation.directions(whitened(sample_patches(burst), whitening)) for burst in probe.known]
+    targets = [adaptation.directions(whitened(sample_patches(burst), whitening)) for burst in bursts]
 
-    def with_all(asked: Sequence[Any]) -> list[Any]:
-        found: list[list[Any]] = [[] for _ in asked]
-        for start in range(0, len(members), AT_ONCE):
-            part = [member.id for member in members[start : start + AT_ONCE]]
-            patches = memory.instances.patches(part)
-            directions = [adaptation.directions(whitened(patches[each], whitening)) for each in part]
-            for each, matches in zip(asked, found):
-                matches.append(match_views(each, directions))
-        return [np.concatenate(matches) for matches in found]
+    found: list[list[Any]] = [[] for _ in targets]
+    for start in range(0, len(members), AT_ONCE):
+        part = [member.id for member in members[start : start + AT_ONCE]]
+        patches = memory.instances.patches(part)
+        directions = [adaptation.directions(whitened(patches[each], whitening)) for each in part]
+        for target, matches in zip(targets, found):
+            matches.append(match_views(target, directions))
 
-    def own_cohort(place: int) -> dict[str, float]:
-        patches = memory.instances.patches([members[place].id, *(members[each].id for each in founders.values())])
-        own, *others = (adaptation.directions(whitened(each, whitening)) for each in patches.values())
-        return dict(zip(founders, match_views(own, others).tolist()))
+    @cache
+    def directions_of(place: int) -> Any:
+        name = members[place].id
+        return adaptation.directions(whitened(memory.instances.patches([name])[name], whitening))
+
+    def of_member(place: int, founders: Sequence[int]) -> list[float]:
+        return match_views(directions_of(place), [directions_of(each) for each in founders]).tolist()
 
     categories = [member.category_id for member in members]
-    founders = cohort_of(categories)
-    return [
-        Comparison.of(
-            categories, found, own_cohort, {category: float(found[place]) for category, place in founders.items()}, Prior.shipped().usual
-        ).ranked()[0]
-        for found in with_all(targets)
-    ]
+    usual = Prior.shipped().usual
+    return [Comparison.of(categories, np.concatenate(matches), of_member, usual).ranked()[0] for matches in found]
 
 
 def _nearness(memory: Memory) -> Any:

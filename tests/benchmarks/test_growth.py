@@ -13,10 +13,13 @@ import pytest
 from benchmarks import growth
 from benchmarks.growth import GrowthRow, Probe
 from benchmarks.synthetic_tokens import Levels, SyntheticTokens
+from clients.cli.bench_growth import exact_best, fill
 from core.backbones.whitening import Whitening
 from core.encode import EncodedBurst
 from core.errors import InvalidInput
 from core.evidence import PATCHES, whitened
+from core.novelty import decide
+from store.memory import Memory
 
 DIM = 32
 WHITENING = Whitening.fit(np.random.default_rng(0).normal(size=(2000, DIM)) * np.linspace(0.3, 2, DIM) + 0.5)
@@ -73,3 +76,13 @@ def test_each_size_is_asked_after_it_was_filled(monkeypatch: pytest.MonkeyPatch,
     assert {file.name for file in tmp_path.iterdir()} == {"growth.json", "growth.png"}
     with pytest.raises(InvalidInput, match="growing"):
         run(None, None, categories=(5, 2))
+
+
+def test_a_memory_compared_member_by_member_decides_as_the_exact_rule(tmp_path: Path) -> None:
+    fill(tmp_path, (TOKENS.burst(category, 0, 3) for category in range(40)))
+    asked = [TOKENS.burst(category, 1, 3) for category in (0, 20, 39)]
+    with Memory.open(tmp_path) as memory:
+        found = [decide(memory.instances.enrolled(WHITENING), burst).similarities[0] for burst in asked]
+        exact = exact_best(memory, asked, WHITENING)
+    assert [category for category, _ in found] == [category for category, _ in exact]
+    assert [similarity for _, similarity in found] == pytest.approx([similarity for _, similarity in exact], abs=1e-4)
