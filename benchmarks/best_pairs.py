@@ -25,7 +25,7 @@ class BestPairs:
     """Tables of all pairs of bursts."""
 
     match: FloatArray
-    """Patch matches at each stage, shape (G, N, N)."""
+    """Matches at each stage, shape (G, N, N)."""
     agreement: FloatArray | None
     """Of reference i with burst j at the best pose, shape (N, N); None where poses take no part."""
     prior: Prior

@@ -24,8 +24,8 @@ from clients.datasets.sources import find_sequences
 from core.backbones import load_backbone
 from core.backbones.whitening import Whitening
 from core.calibration import Prior
-from core.encode import Encoder
-from core.evidence import DEVIATIONS, PATCHES, sample_patches, whitened
+from core.encode import EncodedBurst, Encoder
+from core.evidence import DEVIATIONS, PARTS, part_tokens, whitened
 from core.views import FloatArray
 
 COLUMNS = ("change", "auroc", "nearest")
@@ -35,8 +35,10 @@ COLUMNS = ("change", "auroc", "nearest")
 class Choice:
     """One setting of the evidence."""
 
-    patches: int = PATCHES
+    parts: int = PARTS
     """Of a view."""
+    drawn: bool = False
+    """Whether in their place as many patches are drawn at random."""
     adapted: int = STAGES[-1]
     """Objects, drawn at random, that the statistics adapt to."""
     deviations: float = DEVIATIONS
@@ -63,7 +65,7 @@ def main(
     choices = varied(len(files))
     tables = dict.fromkeys(replace(choice, deviations=DEVIATIONS) for choice in choices.values())
     matches = dict(
-        zip(tables, map_jobs(table, [Job(files, backbone.whitening, choice) for choice in tables], lambda job: 1, "matching patches"))
+        zip(tables, map_jobs(table, [Job(files, backbone.whitening, choice) for choice in tables], lambda job: 1, "matching parts"))
     )
     rows = [row(name, matches[replace(choice, deviations=DEVIATIONS)], choice.deviations, labels) for name, choice in choices.items()]
     if json is not None:
@@ -76,7 +78,8 @@ def varied(objects: int) -> dict[str, Choice]:
     today = Choice()
     return {
         "today's": today,
-        **{f"patches of a view: {count}": replace(today, patches=count) for count in (12, 48, 96)},
+        **{f"parts of a view: {count}": replace(today, parts=count) for count in (1, 3, 12, 24)},
+        **{f"patches of a view, drawn at random: {count}": replace(today, parts=count, drawn=True) for count in (6, 24, 96)},
         **{f"statistics of objects: {count}": replace(today, adapted=count) for count in (0, 8, objects)},
         **{f"deviations: {each}": replace(today, deviations=each) for each in (0.0, 1.0, 2.0, 4.0)},
     }
@@ -84,8 +87,16 @@ def varied(objects: int) -> dict[str, Choice]:
 
 def table(job: Job) -> FloatArray:
     """Matches of all pairs, shape (N, N)."""
-    patches = [whitened(sample_patches(read_views(file), job.choice.patches), job.whitening) for file in job.files]
-    return match_table(patches, adapted(patches, job.choice.adapted))
+    kept = drawn_patches if job.choice.drawn else part_tokens
+    tokens = [whitened(kept(read_views(file), job.choice.parts), job.whitening) for file in job.files]
+    return match_table(tokens, adapted(tokens, job.choice.adapted))
+
+
+def drawn_patches(encoded: EncodedBurst, patches: int) -> FloatArray:
+    """Tokens of random foreground patches of each view, shape (V, K = patches, D); where a view has fewer they are repeated."""
+    rng = np.random.default_rng(0)
+    shown = [view.descriptors for view in encoded.views if len(view.descriptors)]
+    return np.stack([tokens[rng.permutation(len(tokens))[np.arange(patches) % len(tokens)]] for tokens in shown])
 
 
 def row(name: str, matches: FloatArray, deviations: float, labels: NDArray[np.intp]) -> Row:

@@ -43,7 +43,7 @@ class Probe:
     """Of none; the memory learns it in the end."""
     rounds: int
     exact: bool
-    """Whether the exact rule is computed too, which compares each burst with all members patch by patch."""
+    """Whether the exact rule is computed too, which compares each burst with all members part by part."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class GrowthRow:
 
     categories: int
     exact: bool
-    """Whether the service compares every member patch by patch at this size."""
+    """Whether the service compares every member part by part at this size."""
     decide_ms: float
     least_ms: float
     p95_ms: float

@@ -1,10 +1,10 @@
 """The members of a memory, kept ready from decision to decision: one takes the time of a few comparisons, however many members there are.
 
-Up to EXACT members each is compared patch by patch, which is the rule (`core.evidence.Comparison.between`); what does not depend on the
-burst is computed once. Of a larger memory the burst is compared with the mean pooled token of every member first, and patch by patch with
+Up to EXACT members each is compared part by part, which is the rule (`core.evidence.Comparison.between`); what does not depend on the
+burst is computed once. Of a larger memory the burst is compared with the mean pooled token of every member first, and part by part with
 the nearest members, the founders of the nearest categories and the cohort alone.
 
-Letters: V views, K patches a view, D token size.
+Letters: V views, K parts a view, D token size.
 """
 
 from __future__ import annotations
@@ -21,24 +21,24 @@ from torch import Tensor
 
 from core.backbones.whitening import Whitening
 from core.encode import EncodedBurst
-from core.evidence import COHORT, Adaptation, Comparison, Usual, match_views, sample_patches, whitened
+from core.evidence import COHORT, Adaptation, Comparison, Usual, match_views, part_tokens, whitened
 from core.nearness import Listed, Nearness
 from core.views import FloatArray
 
 T = TypeVar("T")
 
 EXACT = 64
-"""Members up to which every one is compared patch by patch: about 25 ms on two cores with ten views a side."""
+"""Members up to which every one is compared part by part: about 25 ms on two cores with ten views a side."""
 NEAREST = 12
-"""So many members, and founders of so many categories, are compared patch by patch in a larger memory, beside the cohort."""
+"""So many members, and founders of so many categories, are compared part by part in a larger memory, beside the cohort."""
 ADAPTED_FROM = 256
-"""Members, evenly spaced, whose patches a larger memory is adapted to; more say nothing new."""
+"""Members, evenly spaced, whose parts a larger memory is adapted to; more say nothing new."""
 GROWTH = 1.25
 """Factor by which a larger memory grows until it is adapted anew, whereupon nothing that was kept holds any longer."""
 ROUNDING = 1e-9
 """Added to a logarithm before it is rounded down: a memory that has just grown by GROWTH counts as grown."""
 KEPT = 512
-"""Members whose patches stay in memory, those compared last: up to 200 MB of ten views each."""
+"""Members whose parts stay in memory, those compared last: up to 200 MB of ten views each."""
 KEPT_COHORTS = 4096
 """Members whose matches with founders stay in memory: about 10 MB."""
 
@@ -50,10 +50,10 @@ class Source(Protocol):
         """All members, oldest first; the same object while nothing has changed."""
 
     def pooled_means(self, ids: Sequence[str]) -> Mapping[str, FloatArray]:
-        """By id, the mean over views of a member's pooled tokens, shape (D,); without those that have no patches, or are damaged."""
+        """By id, the mean over views of a member's pooled tokens, shape (D,); without those that have no parts, or are damaged."""
 
-    def patches(self, ids: Sequence[str]) -> Mapping[str, FloatArray]:
-        """By id, of `core.evidence.sample_patches`, shape (V, K, D); without those that are damaged."""
+    def parts(self, ids: Sequence[str]) -> Mapping[str, FloatArray]:
+        """By id, of `core.evidence.part_tokens`, shape (V, K, D); without those that are damaged."""
 
 
 class Enrolled:
@@ -68,7 +68,7 @@ class Enrolled:
         self._near = Nearness()
         self._adapted_to: list[str] = []
         self._matrix, self._offset = torch.zeros(0, 0), torch.zeros(0)
-        self._patches: _Latest[Tensor] = _Latest(KEPT)
+        self._parts: _Latest[Tensor] = _Latest(KEPT)
         self._cohorts: _Latest[dict[str, float]] = _Latest(KEPT_COHORTS)
         """By member, its matches with founders, by the founder's id."""
 
@@ -86,7 +86,7 @@ class Enrolled:
 
     @property
     def exact(self) -> bool:
-        """Whether every member is compared patch by patch."""
+        """Whether every member is compared part by part."""
         return len(self._near) <= EXACT
 
     def _update(self, listed: Sequence[Listed]) -> None:
@@ -105,7 +105,7 @@ class Enrolled:
         else:
             ((closest, of_near),) = near.nearest(target.pooled.mean(axis=0)[None], NEAREST)
             chosen = sorted({*closest, *of_near, *islice(near.founders.values(), COHORT)})
-        found = match_views(self._directions([sample_patches(target)])[0], self._prepared(chosen))
+        found = match_views(self._directions([part_tokens(target)])[0], self._prepared(chosen))
         return Comparison.of(
             [near.members[place].category_id for place in chosen],
             found,
@@ -124,26 +124,26 @@ class Enrolled:
         return [known[members[each].id] for each in founders]
 
     def _prepared(self, places: Sequence[int]) -> list[Tensor]:
-        """Unit patches of some members, adapted to the memory, each (V, K, D). Raises _DamagedError."""
+        """Unit parts of some members, adapted to the memory, each (V, K, D). Raises _DamagedError."""
         ids = [self._near.members[place].id for place in places]
-        there = {each: self._patches[each] for each in ids if each in self._patches}
+        there = {each: self._parts[each] for each in ids if each in self._parts}
         missing = [each for each in ids if each not in there]
         if missing:
             read = self._read(missing)
             there.update(zip(missing, self._directions([read[each] for each in missing])))
         for each in ids:
-            self._patches.keep(each, there[each])
+            self._parts.keep(each, there[each])
         return [there[each] for each in ids]
 
     def _read(self, ids: Sequence[str]) -> Mapping[str, FloatArray]:
-        read = self._source.patches(ids) if ids else {}
+        read = self._source.parts(ids) if ids else {}
         damaged = {each for each in ids if each not in read}
         if damaged:
             raise _DamagedError(damaged)
         return read
 
     def _directions(self, bursts: Sequence[FloatArray]) -> list[Tensor]:
-        """`whitened` and `Adaptation.directions` in one product, for bursts of patches, each (V, K, D)."""
+        """`whitened` and `Adaptation.directions` in one product, for bursts of parts, each (V, K, D)."""
         tokens = torch.from_numpy(np.concatenate(bursts).astype(np.float32))
         adapted = torch.nn.functional.normalize(tokens @ self._matrix + self._offset, dim=-1)
         return list(torch.split(adapted, [len(burst) for burst in bursts]))
@@ -160,7 +160,7 @@ class Enrolled:
             shipped = self._whitening.matrix.astype(np.float64)
             matrix, offset = shipped @ matrix, offset - (self._whitening.mean @ shipped) @ adaptation.matrix
         self._matrix, self._offset = torch.from_numpy(matrix).float(), torch.from_numpy(offset).float()
-        self._patches.clear()
+        self._parts.clear()
         self._cohorts.clear()
         self._adapted_to = wanted
 

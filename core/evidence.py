@@ -1,14 +1,15 @@
-"""Our similarity of a burst to a category (`best`): whitened patches matched view by view, less what both resemble anyway.
+"""Our similarity of a burst to a category (`best`): whitened parts matched view by view, less what both resemble anyway.
 
-Four things beyond the paper's cosines of [CLS]:
-- patches of the block that serves correspondences, whitened by what ships and then by what this memory has seen;
+Five things beyond the paper's cosines of [CLS]:
+- tokens of the block that serves correspondences, whitened by what ships and then by what this memory has seen;
+- of each view the mean tokens of a few parts, which are patches that look alike: what single patches show differs from object to object;
 - every view counts by the other side's view it matches best, since opposite sides of one object look unalike;
 - a match counts by how far it exceeds what burst and member reach with other categories: some objects resemble everything (hubs), some
   everything a little and some nothing, and a burst of many views finds a good match for each of them. What is left grows neither with the
   number of views nor with that of categories (speaker recognition normalises its scores by a cohort likewise);
 - two members of a category speak for it, where it has two.
 
-Letters: V, W views, K patches a view, D token size, C categories, N bursts or members; * is any batch shape.
+Letters: V, W views, P foreground patches and K parts of a view, D token size, C categories, N bursts or members; * is any batch shape.
 """
 
 from __future__ import annotations
@@ -20,14 +21,17 @@ from itertools import islice
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from scipy.cluster.hierarchy import fcluster, linkage
 from torch import Tensor
 
 from core.backbones.whitening import Whitening
 from core.encode import EncodedBurst
 from core.views import FloatArray
 
-PATCHES = 24
-"""Patches kept of each view, drawn at random: the figures of 12 and of 48 differ by less than a hundredth."""
+PARTS = 6
+"""Of each view: with twice as many, or half, the figures differ by less than a hundredth."""
+DRAWN = 64
+"""Patches of a view, evenly spaced, that its parts are made of: all of them make no better ones, and take ten times as long."""
 COHORT = 32
 """Other categories that tell how well a burst matches anything: the oldest, so that they stay the same while a memory grows."""
 COHORT_PRIOR = 3.0
@@ -38,31 +42,37 @@ MEMBERS = 2
 """Members of a category, the best matching ones, whose evidence is averaged: one alone may match by chance."""
 SHORTLIST = 5
 """Categories, the best matching first, whose evidence is computed."""
-ADAPTATION_PRIOR = 4.0
-"""Bursts for which the shipped mean counts when the memory's own moves it."""
-COVARIANCE_PRIOR = 32.0
-"""The same of the covariance: of few objects it would be the differences between just these, and take them out."""
+ADAPTATION_PRIOR = 32.0
+"""Bursts for which the shipped statistics count when the memory's own move them: the covariance of few objects would be the differences
+between just these, and take them out."""
 LEAST_VARIANCE = 1e-12
 """Added at least in every direction, so that a memory of one and the same token can be adapted to."""
-ADAPTED = 4
-"""Every so many-th patch takes part in the statistics: there are thousands, alike within a view."""
 BATCH = 16
 """Bursts matched at once: about 10 MB with ten views a side."""
 
 
-def sample_patches(encoded: EncodedBurst, patches: int = PATCHES) -> NDArray[np.float16]:
-    """Tokens of random foreground patches, shape (V, K = patches, D); where a view has fewer they are repeated.
+def part_tokens(encoded: EncodedBurst, parts: int = PARTS) -> NDArray[np.float16]:
+    """Tokens of the parts of each view, shape (V, K = parts, D), as of `merged`.
 
     V counts the views that show an object, of which there must be one; the encoder answers none otherwise.
     """
-    rng = np.random.default_rng(0)
-    shown = [view.descriptors for view in encoded.views if len(view.descriptors)]
-    return np.stack([tokens[rng.permutation(len(tokens))[np.arange(patches) % len(tokens)]] for tokens in shown]).astype(np.float16)
+    return np.stack([merged(view.descriptors, parts) for view in encoded.views if len(view.descriptors)])
 
 
-def whitened(patches: FloatArray, whitening: Whitening | None) -> FloatArray:
-    """Patches, shape (*, D), in single precision, and whitened where the backbone has statistics."""
-    return patches.astype(np.float32) if whitening is None else whitening.apply(patches.astype(np.float32))
+def merged(tokens: FloatArray, parts: int = PARTS) -> NDArray[np.float16]:
+    """Mean tokens of clusters of like patches (Ward 1963), shape (K = parts, D), from those of P > 0 patches, shape (P, D).
+
+    Where there are fewer clusters they are repeated.
+    """
+    drawn = tokens[np.unique(np.linspace(0, len(tokens) - 1, DRAWN).round().astype(int))].astype(np.float32)
+    part_of = fcluster(linkage(drawn, "ward"), parts, "maxclust") if len(drawn) > 1 else np.ones(1)
+    means = np.stack([drawn[part_of == part].mean(axis=0) for part in np.unique(part_of)])
+    return np.asarray(means[np.arange(parts) % len(means)], dtype=np.float16)
+
+
+def whitened(tokens: FloatArray, whitening: Whitening | None) -> FloatArray:
+    """Tokens, shape (*, D), in single precision, and whitened where the backbone has statistics."""
+    return tokens.astype(np.float32) if whitening is None else whitening.apply(tokens.astype(np.float32))
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,18 +86,18 @@ class Adaptation:
 
     @staticmethod
     def fit(members: Sequence[FloatArray]) -> Adaptation:
-        """From the whitened patches of at least one burst, each (V, K, D), without any label.
+        """From the whitened parts of at least one burst, each (V, K, D), without any label.
 
         Few bursts say little of D² covariances: mean and covariance are shrunk towards those that ship, which after whitening are taken to
         be zero and isotropic. The mean variance is added once more, so that directions of little variance are not blown up.
         """
-        drawn = [member[:, ::ADAPTED].reshape(-1, member.shape[-1]).astype(np.float64) for member in members]
-        count = len(drawn)
-        mean = np.mean([each.mean(axis=0) for each in drawn], axis=0)
-        centred = np.concatenate(drawn) - mean
+        tokens = [member.reshape(-1, member.shape[-1]).astype(np.float64) for member in members]
+        count = len(tokens)
+        mean = np.mean([each.mean(axis=0) for each in tokens], axis=0)
+        centred = np.concatenate(tokens) - mean
         covariance = centred.T @ centred / len(centred)
         variance = float(np.trace(covariance)) / len(mean)
-        covariance = (count * covariance + COVARIANCE_PRIOR * variance * np.eye(len(mean))) / (count + COVARIANCE_PRIOR)
+        covariance = (count * covariance + ADAPTATION_PRIOR * variance * np.eye(len(mean))) / (count + ADAPTATION_PRIOR)
         variances, vectors = np.linalg.eigh(covariance)
         scaled = vectors / np.sqrt(variances.clip(0) + max(variance, LEAST_VARIANCE))
         return Adaptation(count * mean / (count + ADAPTATION_PRIOR), scaled @ vectors.T)
@@ -97,15 +107,15 @@ class Adaptation:
         """That of a memory that holds nothing, for tokens of size D: it changes nothing."""
         return Adaptation(np.zeros(size), np.eye(size))
 
-    def directions(self, patches: FloatArray) -> Tensor:
-        """Adapted patches of length 1, from whitened ones, both shape (V, K, D)."""
-        return torch.nn.functional.normalize(torch.from_numpy((patches - self.mean) @ self.matrix).float(), dim=-1)
+    def directions(self, parts: FloatArray) -> Tensor:
+        """Adapted parts of length 1, from whitened ones, both shape (V, K, D)."""
+        return torch.nn.functional.normalize(torch.from_numpy((parts - self.mean) @ self.matrix).float(), dim=-1)
 
 
 def match_views(target: Tensor, others: Sequence[Tensor]) -> FloatArray:
-    """How well a burst matches each of N others, shape (N,), from unit patches: (V, K, D), and (W, K, D) of each other.
+    """How well a burst matches each of N others, shape (N,), from unit parts: (V, K, D), and (W, K, D) of each other.
 
-    Two views match by the mean over patches of the cosine to the other's most similar patch, both ways; two bursts by the mean over views
+    Two views match by the mean over parts of the cosine to the other's most similar part, both ways; two bursts by the mean over views
     of the match with the other's best matching view, both ways.
     """
     found: list[float] = []
@@ -144,8 +154,8 @@ class Entry:
     """A member of the memory as the evidence sees it."""
 
     category_id: str
-    patches: Tensor
-    """Unit patches, adapted to the memory, shape (V, K, D)."""
+    parts: Tensor
+    """Unit parts, adapted to the memory, shape (V, K, D)."""
 
 
 @dataclass(frozen=True)
@@ -173,14 +183,14 @@ class Comparison:
 
     @staticmethod
     def between(target: Tensor, entries: Sequence[Entry], usual: Usual) -> Comparison:
-        """With every member, oldest first, patch by patch: the rule that `core.enrolled` keeps to.
+        """With every member, oldest first, part by part: the rule that `core.enrolled` keeps to.
 
-        `target`: unit patches, adapted to the same memory, shape (V, K, D).
+        `target`: unit parts, adapted to the same memory, shape (V, K, D).
         """
-        found = match_views(target, [entry.patches for entry in entries])
+        found = match_views(target, [entry.parts for entry in entries])
 
         def of_member(place: int, founders: Sequence[int]) -> list[float]:
-            return match_views(entries[place].patches, [entries[founder].patches for founder in founders]).tolist()
+            return match_views(entries[place].parts, [entries[founder].parts for founder in founders]).tolist()
 
         return Comparison.of([entry.category_id for entry in entries], found, of_member, usual)
 
@@ -204,7 +214,7 @@ class Comparison:
     def ranked(self, without: str | None = None) -> list[tuple[str, float]]:
         """(category, evidence) of up to SHORTLIST categories, the best matching ones, most evidence first.
 
-        As if `without` were not in the memory, but that patches stay adapted to it too, and that no younger category takes its place in the
+        As if `without` were not in the memory, but that parts stay adapted to it too, and that no younger category takes its place in the
         cohort.
         """
         shortlist = [category for category in self.matched if category != without][:SHORTLIST]

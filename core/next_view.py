@@ -17,7 +17,7 @@ from core.backbones.whitening import Whitening
 from core.camera_poses import angles_about_deg
 from core.encode import EncodedBurst
 from core.errors import InvalidInput
-from core.evidence import Adaptation, match_views, sample_patches, whitened
+from core.evidence import Adaptation, match_views, part_tokens, whitened
 from core.reference import Reference
 from core.scan import ScanOptions, request_scan
 from core.sim3 import Sim3
@@ -69,8 +69,8 @@ def _difference(places_m: FloatArray, center_m: FloatArray, candidates: Sequence
         if any(view.camera is None for view in shown):
             raise InvalidInput("reference", "has a view without camera: scan the category anew with K and world_from_camera")
         cameras = candidate.target_from_reference.apply(np.stack([view.camera.world_from_camera[:3, 3] for view in shown if view.camera]))
-        patches = whitened(sample_patches(EncodedBurst(tuple(shown), candidate.reference.fingerprint)), whitening)
-        units = Adaptation.none(patches.shape[-1]).directions(patches)
+        parts = whitened(part_tokens(EncodedBurst(tuple(shown), candidate.reference.fingerprint)), whitening)
+        units = Adaptation.none(parts.shape[-1]).directions(parts)
         predicted.append((angles_about_deg(places_m, cameras, center_m).argmin(axis=1), units))
     (first, of_first), (second, of_second) = predicted
     pairs = {pair: 1 - float(match_views(of_first[[pair[0]]], [of_second[[pair[1]]]])[0]) for pair in set(zip(first, second))}

@@ -1,6 +1,6 @@
 """Known, uncertain or novel: a burst against every category (paper, "Continual category learning", and ours).
 
-Letters: V views, K patches of a view, D token size.
+Letters: V views, K parts of a view, D token size.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from core.calibration import LARGEST_RATE, Calibration, Levels, Prior
 from core.encode import EncodedBurst
 from core.enrolled import Enrolled
 from core.errors import InvalidInput
-from core.evidence import Adaptation, Comparison, Entry, Usual, sample_patches, whitened
+from core.evidence import Adaptation, Comparison, Entry, Usual, part_tokens, whitened
 from core.scores import BEST, DEFAULT_SCORE, SCORES, require_score
 from core.views import FloatArray
 
@@ -37,13 +37,13 @@ class Member:
     """[CLS] of each view, shape (V, D)."""
     pooled: FloatArray
     """Mean foreground token of each view, whitened where the backbone has statistics, shape (V, D)."""
-    patches: FloatArray | None = None
-    """Of `core.evidence.sample_patches`, shape (V, K, D)."""
+    parts: FloatArray | None = None
+    """Of `core.evidence.part_tokens`, shape (V, K, D)."""
 
     @classmethod
     def of(cls, category_id: str, burst: EncodedBurst) -> Member:
         """What the memory holds of a burst that was assigned to a category."""
-        return cls(category_id, burst.cls, burst.pooled, sample_patches(burst))
+        return cls(category_id, burst.cls, burst.pooled, part_tokens(burst))
 
 
 @dataclass(frozen=True)
@@ -135,7 +135,7 @@ def decide(
 ) -> Decision:
     """The most similar category if it is similar enough; uncertain where that cannot be told; else novel.
 
-    An empty memory finds everything novel. Members without patches are no part of `best`; enrolled ones serve no other score, and bring
+    An empty memory finds everything novel. Members without parts are no part of `best`; enrolled ones serve no other score, and bring
     their own whitening.
     """
     config = config or DecisionConfig()
@@ -189,9 +189,9 @@ def _by_evidence(memory: Sequence[Member] | Enrolled, target: EncodedBurst, conf
 def _compare(memory: Sequence[Member] | Enrolled, target: EncodedBurst, whitening: Whitening | None, usual: Usual) -> Comparison | None:
     if isinstance(memory, Enrolled):
         return memory.compare(target, usual)
-    members = [(member.category_id, whitened(member.patches, whitening)) for member in memory if member.patches is not None]
+    members = [(member.category_id, whitened(member.parts, whitening)) for member in memory if member.parts is not None]
     if not members:
         return None
-    adaptation = Adaptation.fit([patches for _, patches in members])
-    entries = [Entry(category_id, adaptation.directions(patches)) for category_id, patches in members]
-    return Comparison.between(adaptation.directions(whitened(sample_patches(target), whitening)), entries, usual)
+    adaptation = Adaptation.fit([parts for _, parts in members])
+    entries = [Entry(category_id, adaptation.directions(parts)) for category_id, parts in members]
+    return Comparison.between(adaptation.directions(whitened(part_tokens(target), whitening)), entries, usual)

@@ -104,7 +104,8 @@ class Manifest(_Part):
     """What an archive says of itself; a later version of the format is refused."""
 
     format: Literal["onelook-categories"]
-    version: Literal[1]
+    version: Literal[1, 2]
+    """1 has tokens of patches drawn at random in the place of parts."""
     created_at: Time
     backbone: Name
     fingerprint: Name
@@ -144,7 +145,7 @@ def export(
                 progress(len(parts), len(chosen))
             kept = connection.meta()
             made_with = {key: kept[key] for key in ("backbone", "fingerprint") if key in kept}
-            manifest = Manifest(format="onelook-categories", version=1, created_at=now(), categories=parts, **made_with)
+            manifest = Manifest(format="onelook-categories", version=2, created_at=now(), categories=parts, **made_with)
             archive.writestr(_info(MANIFEST), manifest.model_dump_json(indent=1))
         sync(partial)
         os.link(partial, path)  # unlike a rename, this never replaces what came there meanwhile

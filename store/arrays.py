@@ -10,13 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from core.evidence import merged
 from store.folders import Files, FileSum, read_whole
 
 Array = NDArray[Any]
 BLOB_TYPE = np.dtype("<f4")
 """Tokens are kept as they were computed: rounding them would make a restarted service decide otherwise."""
-PATCH_TYPE = np.dtype("<f2")
-"""Patches are drawn in half precision."""
+PART_TYPE = np.dtype("<f2")
+"""Parts are made in half precision."""
 
 
 def write_arrays(path: Path, arrays: Mapping[str, Array]) -> str:
@@ -50,11 +51,16 @@ def tokens_from_blob(blob: bytes, views: int) -> NDArray[np.float32]:
     return np.frombuffer(blob, BLOB_TYPE).reshape(views, -1).astype(np.float32, copy=False)
 
 
-def patches_to_blob(patches: NDArray[np.floating]) -> bytes:
-    """Patch tokens, shape (V, K, D), as bytes."""
-    return np.ascontiguousarray(patches, dtype=PATCH_TYPE).tobytes()
+def parts_to_blob(parts: NDArray[np.floating]) -> bytes:
+    """Tokens of parts, shape (V, K, D), as bytes."""
+    return np.ascontiguousarray(parts, dtype=PART_TYPE).tobytes()
 
 
-def patches_from_blob(blob: bytes, views: int, dim: int) -> NDArray[np.floating]:
-    """The tokens of `patches_to_blob`, shape (views, K, dim)."""
-    return np.frombuffer(blob, PATCH_TYPE).reshape(views, -1, dim)
+def parts_from_patches(blob: bytes, views: int, dim: int) -> bytes:
+    """Parts as of `parts_to_blob`, from patches that an earlier version drew at random. Raises ValueError where some are not finite."""
+    return parts_to_blob(np.stack([merged(view) for view in parts_from_blob(blob, views, dim)]))
+
+
+def parts_from_blob(blob: bytes, views: int, dim: int) -> NDArray[np.floating]:
+    """The tokens of `parts_to_blob`, shape (views, K, dim)."""
+    return np.frombuffer(blob, PART_TYPE).reshape(views, -1, dim)

@@ -14,8 +14,8 @@ from sqlite_utils import Database
 from core.errors import Conflict, InvalidInput, OneLookError, Unavailable
 from core.reference import Reference
 from store import untrusted
-from store.archive import FILE_NAME, MANIFEST, CategoryEntry, Manifest, token_name
-from store.arrays import BLOB_TYPE, arrays_file, patches_from_blob
+from store.archive import FILE_NAME, MANIFEST, CategoryEntry, InstanceEntry, Manifest, token_name
+from store.arrays import BLOB_TYPE, Array, arrays_file, parts_from_blob, parts_from_patches
 from store.audit import record
 from store.bursts import read_burst
 from store.categories import insert_category
@@ -215,20 +215,29 @@ def _instances(part: CategoryEntry, category_id: str, tokens: bytes, dim: int) -
     arrays = untrusted.arrays(tokens, "tokens")
     rows = []
     for index, instance in enumerate(part.instances):
-        found = {column: arrays.get(token_name(index, column)) for column in TOKENS}
-        blobs: Row = {column: None if array is None else array.tobytes() for column, array in found.items()}
-        _require(tokens_sha256(blobs) == instance.tokens_sha256, f"the tokens of instance {index} are what was written")
-        for column in ("cls", "pooled"):
-            tokens_of = np.frombuffer(blobs[column], BLOB_TYPE).reshape(instance.views, dim)
-            _require(bool(np.isfinite(tokens_of).all()), f"{column} of instance {index} is finite")
-        if blobs["patches"] is not None:
-            patches = patches_from_blob(blobs["patches"], instance.views, dim)
-            _require(patches.shape[1] > 0 and bool(np.isfinite(patches).all()), f"the patches of instance {index} are finite")
         pictures = f"categories/{category_id}" if instance.of_reference else None
-        rows.append(
-            instance.model_dump(exclude={"of_reference"}) | blobs | {"id": new_id(), "category_id": category_id, "pictures": pictures}
-        )
+        own = {"id": new_id(), "category_id": category_id, "pictures": pictures}
+        rows.append(instance.model_dump(exclude={"of_reference"}) | _tokens(arrays, index, instance, dim) | own)
     return rows
+
+
+def _tokens(arrays: Mapping[str, Array], index: int, instance: InstanceEntry, dim: int) -> Row:
+    """The columns of an instance that a backbone computed, and their checksum."""
+    found = {column: arrays.get(token_name(index, column)) for column in TOKENS}
+    patches = arrays.get(token_name(index, "patches"))
+    if patches is not None:
+        found["parts"] = patches
+    blobs: Row = {column: None if array is None else array.tobytes() for column, array in found.items()}
+    _require(tokens_sha256(blobs) == instance.tokens_sha256, f"the tokens of instance {index} are what was written")
+    for column in ("cls", "pooled"):
+        tokens_of = np.frombuffer(blobs[column], BLOB_TYPE).reshape(instance.views, dim)
+        _require(bool(np.isfinite(tokens_of).all()), f"{column} of instance {index} is finite")
+    if blobs["parts"] is not None:
+        parts = parts_from_blob(blobs["parts"], instance.views, dim)
+        _require(parts.shape[1] > 0 and bool(np.isfinite(parts).all()), f"the parts of instance {index} are finite")
+    if patches is not None:
+        blobs["parts"] = parts_from_patches(blobs["parts"], instance.views, dim)
+    return blobs | {"tokens_sha256": tokens_sha256(blobs)}
 
 
 def _require(holds: bool, what: str) -> None:

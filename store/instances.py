@@ -18,11 +18,11 @@ from core.backbones.whitening import Whitening
 from core.encode import EncodedBurst
 from core.enrolled import Enrolled
 from core.errors import Conflict, NotFound, Unavailable
-from core.evidence import sample_patches
+from core.evidence import part_tokens
 from core.nearness import Listed
 from core.novelty import Member
 from core.views import Burst
-from store.arrays import BLOB_TYPE, Array, patches_from_blob, patches_to_blob, tokens_from_blob, tokens_to_blob
+from store.arrays import BLOB_TYPE, Array, parts_from_blob, parts_to_blob, tokens_from_blob, tokens_to_blob
 from store.audit import record
 from store.bursts import read_burst
 from store.connection import Connection, Row, new_id
@@ -32,7 +32,7 @@ from store.times import now
 
 COLUMNS = "i.id, i.category_id, i.created_at, i.source, i.source_id, i.how, i.similarity, i.views, i.pictures"
 LIVING = "FROM instances i JOIN categories c ON c.id = i.category_id WHERE i.removed_by IS NULL AND c.removed_by IS NULL"
-TOKENS = ("cls", "pooled", "patches")
+TOKENS = ("cls", "pooled", "parts")
 """The columns that hold them."""
 Tokens = tuple[Array, Array]
 """[CLS] and pooled, shapes (V, D)."""
@@ -112,10 +112,10 @@ class Instances:
         return self._listed[1]
 
     def pooled_means(self, ids: Sequence[str]) -> dict[str, Array]:
-        """Means over views of pooled tokens, shape (D,), without instances that have no patches; nothing behind these tokens is read."""
+        """Means over views of pooled tokens, shape (D,), without instances that have no parts; nothing behind these tokens is read."""
         found = {}
-        for row in self._rows(ids, "id, views, pooled, typeof(patches) AS patches"):
-            if row["patches"] != "null":
+        for row in self._rows(ids, "id, views, pooled, typeof(parts) AS parts"):
+            if row["parts"] != "null":
                 mean = tokens_from_blob(row["pooled"], row["views"]).mean(axis=0)
                 if np.isfinite(mean).all():
                     found[row["id"]] = mean
@@ -123,14 +123,14 @@ class Instances:
                     self._tell(row["id"])
         return found
 
-    def patches(self, ids: Sequence[str]) -> dict[str, Array]:
-        """Patches, shape (V, K, D), of those that have any and are not damaged."""
+    def parts(self, ids: Sequence[str]) -> dict[str, Array]:
+        """Tokens of parts, shape (V, K, D), of those that have any and are not damaged."""
         found = {}
         for row in self._rows(ids, f"id, views, {', '.join(TOKENS)}, tokens_sha256"):
             if damaged(row):
                 self._tell(row["id"])
-            elif row["patches"] is not None:
-                found[row["id"]] = patches_from_blob(row["patches"], row["views"], len(row["cls"]) // BLOB_TYPE.itemsize // row["views"])
+            elif row["parts"] is not None:
+                found[row["id"]] = parts_from_blob(row["parts"], row["views"], len(row["cls"]) // BLOB_TYPE.itemsize // row["views"])
         return found
 
     def reload(self) -> None:
@@ -175,7 +175,7 @@ def token_columns(encoded: EncodedBurst) -> Row:
     row: Row = {
         "cls": tokens_to_blob(encoded.cls),
         "pooled": tokens_to_blob(encoded.pooled),
-        "patches": patches_to_blob(sample_patches(encoded)),
+        "parts": parts_to_blob(part_tokens(encoded)),
     }
     return row | {"views": len(encoded.cls), "tokens_sha256": tokens_sha256(row)}
 

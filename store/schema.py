@@ -11,6 +11,7 @@ from sqlite_utils import Database, Migrations
 from sqlite_utils.db import ForeignKey
 
 from core.errors import Conflict, Unavailable
+from store.arrays import BLOB_TYPE, parts_from_patches
 from store.folders import partial_of, sync
 
 migrations = Migrations("onelook")
@@ -253,6 +254,22 @@ def m007_members(db: Database) -> None:
         name = f"{table}_{happens.split()[0].lower()}"
         change = "UPDATE meta SET value = value + 1 WHERE key = 'members_version'"
         db.execute(f"CREATE TRIGGER {name} AFTER {happens} ON {table} BEGIN {change}; END")
+
+
+@migrations()
+def m008_parts(db: Database) -> None:
+    """Decisions compare parts, which are patches that look alike, where they compared patches drawn at random.
+
+    Evidence of before is no sample of what objects of no known category find now.
+    """
+    db.execute("UPDATE observations SET decision = json_set(decision, '$.rival', NULL) WHERE decision IS NOT NULL")
+    db.execute("ALTER TABLE instances RENAME COLUMN patches TO parts")
+    for instance in list(db.query("SELECT id FROM instances WHERE parts IS NOT NULL")):
+        row = db.table("instances").get(instance["id"])
+        tokens = row["cls"] + row["pooled"]
+        if hashlib.sha256(tokens + row["parts"]).hexdigest() == row["tokens_sha256"]:  # else damaged: it stays, to be told
+            parts = parts_from_patches(row["parts"], row["views"], len(row["cls"]) // BLOB_TYPE.itemsize // row["views"])
+            db.table("instances").update(row["id"], {"parts": parts, "tokens_sha256": hashlib.sha256(tokens + parts).hexdigest()})
 
 
 def _reference(table: str, column: str, other_table: str, on_delete: str) -> ForeignKey:

@@ -14,7 +14,7 @@ from store.times import ago, ahead
 
 
 def seal(connection: Connection) -> None:
-    """Completes rows that an earlier version wrote: checksums of their files, patch tokens, and when a scan ends."""
+    """Completes rows that an earlier version wrote: checksums of their files, tokens of parts, and when a scan ends."""
     for table, query in FOLDERS.items():
         for row in connection.rows(f"{query} WHERE files IS NULL"):
             folder = connection.root / row["folder"]
@@ -23,19 +23,19 @@ def seal(connection: Connection) -> None:
                 db.execute(f"UPDATE {table} SET files = ? WHERE id = ?", [files, row["id"]])
     with connection.housekeeping() as db:
         db.execute("UPDATE scans SET expires_at = ? WHERE expires_at IS NULL", [ahead(connection.retention.scans)])
-    for folder in connection.rows("SELECT DISTINCT pictures FROM instances WHERE patches IS NULL AND pictures IS NOT NULL"):
+    for folder in connection.rows("SELECT DISTINCT pictures FROM instances WHERE parts IS NULL AND pictures IS NOT NULL"):
         _complete_tokens(connection, folder["pictures"])
 
 
 def _complete_tokens(connection: Connection, pictures: str) -> None:
-    """Draws the patch tokens of the instances that a folder shows from its arrays, where these are those of the instances."""
+    """Makes the tokens of parts of the instances that a folder shows from its arrays, where these are those of the instances."""
     try:
         name, file = arrays_file(files_of(connection, pictures))
         columns = token_columns(burst_from_arrays(read_arrays(connection.root / pictures / name, file.sha256)))
     except (NotFound, Unavailable, LookupError, StopIteration):  # damaged, or no arrays of a burst: such an instance stays as it is
         return
     with connection.housekeeping() as db:
-        for instance in list(db.query("SELECT * FROM instances WHERE patches IS NULL AND pictures = ?", [pictures])):
+        for instance in list(db.query("SELECT * FROM instances WHERE parts IS NULL AND pictures = ?", [pictures])):
             if not damaged(instance) and instance["cls"] == columns["cls"]:
                 db.table("instances").update(instance["id"], columns)
 

@@ -154,31 +154,31 @@ def _answers(memory: Memory, probe: Probe, decisions: Sequence[Decision], whiten
 
 
 def exact_best(memory: Memory, bursts: Sequence[EncodedBurst], whitening: Any) -> list[tuple[str, float]]:
-    """The most similar category of each burst and its similarity, with every member compared patch by patch."""
+    """The most similar category of each burst and its similarity, with every member compared part by part."""
     import numpy as np
 
     from core.calibration import Prior
     from core.enrolled import adapted_from
-    from core.evidence import Adaptation, Comparison, match_views, sample_patches, whitened
+    from core.evidence import Adaptation, Comparison, match_views, part_tokens, whitened
 
     members = memory.instances.listed()
     sample = [members[place].id for place in adapted_from(len(members))]
-    read = memory.instances.patches(sample)
+    read = memory.instances.parts(sample)
     adaptation = Adaptation.fit([whitened(read[each], whitening) for each in sample])
-    targets = [adaptation.directions(whitened(sample_patches(burst), whitening)) for burst in bursts]
+    targets = [adaptation.directions(whitened(part_tokens(burst), whitening)) for burst in bursts]
 
     found: list[list[Any]] = [[] for _ in targets]
     for start in range(0, len(members), AT_ONCE):
-        part = [member.id for member in members[start : start + AT_ONCE]]
-        patches = memory.instances.patches(part)
-        directions = [adaptation.directions(whitened(patches[each], whitening)) for each in part]
+        some = [member.id for member in members[start : start + AT_ONCE]]
+        parts = memory.instances.parts(some)
+        directions = [adaptation.directions(whitened(parts[each], whitening)) for each in some]
         for target, matches in zip(targets, found):
             matches.append(match_views(target, directions))
 
     @cache
     def directions_of(place: int) -> Any:
         name = members[place].id
-        return adaptation.directions(whitened(memory.instances.patches([name])[name], whitening))
+        return adaptation.directions(whitened(memory.instances.parts([name])[name], whitening))
 
     def of_member(place: int, founders: Sequence[int]) -> list[float]:
         return match_views(directions_of(place), [directions_of(each) for each in founders]).tolist()

@@ -17,7 +17,7 @@ from clients.cli.bench_growth import exact_best, fill
 from core.backbones.whitening import Whitening
 from core.encode import EncodedBurst
 from core.errors import InvalidInput
-from core.evidence import PATCHES, whitened
+from core.evidence import PARTS, whitened
 from core.novelty import decide
 from store.memory import Memory
 
@@ -33,13 +33,13 @@ def test_the_same_instance_is_the_same_tokens_and_no_other_is() -> None:
     burst = TOKENS.burst(3, 0, 4)
     assert np.array_equal(burst.pooled, TOKENS.burst(3, 0, 4).pooled)
     assert not np.array_equal(burst.pooled, TOKENS.burst(3, 1, 4).pooled)
-    assert [view.descriptors.shape for view in burst.views] == [(PATCHES, DIM)] * 4
+    assert [view.descriptors.shape for view in burst.views] == [(PARTS, DIM)] * 4
 
 
 def test_raw_tokens_are_whitened_to_what_was_drawn() -> None:
     view = TOKENS.burst(5, 0, 2).views[1]
-    np.testing.assert_allclose(whitened(view.descriptors, WHITENING), TOKENS.patches(5, 0, 2)[1], atol=1e-3)
-    np.testing.assert_allclose(view.pooled, TOKENS.patches(5, 0, 2)[1].mean(axis=0), atol=1e-3)
+    np.testing.assert_allclose(whitened(view.descriptors, WHITENING), TOKENS.parts(5, 0, 2)[1], atol=1e-3)
+    np.testing.assert_allclose(view.pooled, TOKENS.parts(5, 0, 2)[1].mean(axis=0), atol=1e-3)
 
 
 def test_bursts_of_a_category_match_better_than_others() -> None:

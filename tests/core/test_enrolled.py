@@ -16,16 +16,16 @@ from core.novelty import Context, DecisionConfig, Member, decide
 
 from .conftest import PaintedObject
 
-DIM, VIEWS, PATCHES = 48, 3, 24
+DIM, VIEWS, PARTS = 48, 3, 24
 ROOM = np.random.default_rng(1).normal(size=(400, DIM))
 """Directions of tokens, one a kind of thing."""
 WHITENING = Whitening.fit(np.random.default_rng(2).normal(size=(500, DIM)) * np.linspace(0.5, 2, DIM) + 0.3)
 
 
 def tokens(kind: int, seed: int) -> np.ndarray:
-    """Patches of an instance of a kind of thing, shape (VIEWS, PATCHES, DIM)."""
+    """Parts of an instance of a kind of thing, shape (VIEWS, PARTS, DIM)."""
     rng = np.random.default_rng([kind, seed])
-    return ROOM[kind] + 0.3 * rng.normal(size=DIM) + 0.8 * rng.normal(size=(VIEWS, PATCHES, DIM))
+    return ROOM[kind] + 0.3 * rng.normal(size=DIM) + 0.8 * rng.normal(size=(VIEWS, PARTS, DIM))
 
 
 class Kept:
@@ -49,7 +49,7 @@ class Kept:
     def pooled_means(self, ids: Sequence[str]) -> Mapping[str, np.ndarray]:
         return {each: tokens(*self.of[each]).mean(axis=(0, 1)) for each in ids}
 
-    def patches(self, ids: Sequence[str]) -> Mapping[str, np.ndarray]:
+    def parts(self, ids: Sequence[str]) -> Mapping[str, np.ndarray]:
         self.read += ids
         return {each: tokens(*self.of[each]).astype(np.float16) for each in ids if each not in self.damaged}
 

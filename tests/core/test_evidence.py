@@ -12,13 +12,15 @@ from core.evidence import (
     COHORT,
     COHORT_PRIOR,
     DEVIATIONS,
+    PARTS,
     Adaptation,
     Comparison,
     Entry,
     Usual,
     cohort_level,
     match_views,
-    sample_patches,
+    merged,
+    part_tokens,
 )
 
 from .conftest import PaintedObject
@@ -116,10 +118,30 @@ def test_a_memory_of_one_category_is_judged_by_what_ships() -> None:
     assert alone.ranked(without="only") == []
 
 
-def test_patches_are_drawn_the_same_way_every_time_from_views_that_show_something(painted: PaintedObject) -> None:
+def test_a_view_is_kept_as_its_parts(painted: PaintedObject) -> None:
     burst = painted.encode(3)
-    first, again = sample_patches(burst), sample_patches(burst)
-    assert first.shape == (3, 24, 48)
-    np.testing.assert_array_equal(first, again)
-    length = torch.linalg.vector_norm(Adaptation.none(48).directions(first.astype(np.float32)), dim=-1)
-    torch.testing.assert_close(length, torch.ones(3, 24))
+    parts = part_tokens(burst)
+    assert parts.shape == (3, PARTS, 48)
+    np.testing.assert_array_equal(parts[1], merged(burst.views[1].descriptors))
+    length = torch.linalg.vector_norm(Adaptation.none(48).directions(parts.astype(np.float32)), dim=-1)
+    torch.testing.assert_close(length, torch.ones(3, PARTS))
+
+
+def test_patches_that_look_alike_are_one_part() -> None:
+    near = np.random.default_rng(0).normal(size=(40, 6)) * 0.01
+    tokens = near + np.repeat(np.eye(6)[:4], 10, axis=0)
+    expected = tokens.reshape(4, 10, 6).mean(axis=1)
+    found = merged(tokens[np.random.default_rng(1).permutation(40)], 4)
+    np.testing.assert_allclose(sorted(found.tolist()), sorted(expected.tolist()), atol=1e-3)
+
+
+@pytest.mark.parametrize("tokens", [np.ones((1, 6)), np.ones((3, 6)), np.eye(6)[:2]])
+def test_a_view_of_fewer_patches_than_parts_repeats_them(tokens: np.ndarray) -> None:
+    found = merged(tokens)
+    assert found.shape == (PARTS, 6)
+    assert {tuple(part) for part in found.tolist()} == {tuple(token) for token in tokens.tolist()}
+
+
+def test_of_a_view_of_many_patches_all_places_take_part() -> None:
+    tokens = np.repeat(np.eye(6), [500, 20, 20, 20, 20, 500], axis=0)
+    assert {tuple(part) for part in merged(tokens).tolist()} == {tuple(axis) for axis in np.eye(6).tolist()}

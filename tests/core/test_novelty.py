@@ -10,7 +10,7 @@ import pytest
 from core.backbones.whitening import Whitening
 from core.encode import EncodedBurst
 from core.errors import InvalidInput
-from core.evidence import PATCHES, sample_patches, whitened
+from core.evidence import PARTS, part_tokens, whitened
 from core.novelty import Context, Decision, DecisionConfig, Member, decide
 from core.scores import BEST, SCORES
 
@@ -52,7 +52,7 @@ def kind_of_tokens(kind: int, seed: int, views: int = 4) -> np.ndarray:
     """Patches, shape (V, K, D), of an instance: its kind's tokens, somewhat its own, view by view."""
     rng = np.random.default_rng([kind, seed])
     own = ROOM[kind] + 0.2 * rng.normal(size=384)
-    return own + 0.3 * rng.normal(size=(views, PATCHES, 384))
+    return own + 0.3 * rng.normal(size=(views, PARTS, 384))
 
 
 def member(kind: int, seed: int) -> Member:
@@ -67,11 +67,11 @@ def seen(painted: PaintedObject, kind: int, seed: int, views: int = 4) -> Encode
 SIX_KINDS = [member(kind, seed) for kind in range(6) for seed in range(2)]
 
 
-def test_of_a_burst_the_memory_holds_its_tokens_and_a_sample_of_its_patches(painted: PaintedObject) -> None:
+def test_of_a_burst_the_memory_holds_its_tokens_and_those_of_its_parts(painted: PaintedObject) -> None:
     burst = seen(painted, 0, 0)
     held = Member.of("kind 0", burst)
     assert held.category_id == "kind 0"
-    for kept, tokens in ((held.cls, burst.cls), (held.pooled, burst.pooled), (held.patches, sample_patches(burst))):
+    for kept, tokens in ((held.cls, burst.cls), (held.pooled, burst.pooled), (held.parts, part_tokens(burst))):
         assert np.array_equal(kept, tokens)
 
 
@@ -83,9 +83,9 @@ def test_best_knows_other_instances_and_finds_other_kinds_novel(painted: Painted
     assert {decide(SIX_KINDS, seen(painted, kind, 9)).outcome for kind in range(6, 12)} <= {"novel", "uncertain"}
 
 
-def test_patches_are_compared_as_the_backbone_whitens_them(painted: PaintedObject) -> None:
+def test_parts_are_compared_as_the_backbone_whitens_them(painted: PaintedObject) -> None:
     whitening = Whitening.fit(np.random.default_rng(2).normal(size=(500, 384)) * np.linspace(0.5, 2, 384) + 0.3)
-    by_hand = [replace(each, patches=whitened(each.patches, whitening)) for each in SIX_KINDS]
+    by_hand = [replace(each, parts=whitened(each.parts, whitening)) for each in SIX_KINDS]
     told = decide(SIX_KINDS, seen(painted, 2, 9), context=Context(whitening))
     asked = painted.with_tokens(whitened(kind_of_tokens(2, 9), whitening))
     assert told.similarity == pytest.approx(decide(by_hand, asked).similarity, abs=1e-3)
@@ -96,7 +96,7 @@ def test_evidence_does_not_depend_on_how_often_a_view_is_sent(painted: PaintedOb
     burst = seen(painted, 2, 9)
     twice = EncodedBurst(burst.views + burst.views, "painted")
     once, again = decide(SIX_KINDS, burst), decide(SIX_KINDS, twice)
-    # The patches of each copy are drawn by the same generator, one view after the other, so they are not the very same.
+    # The same parts, and statistics that do not count views twice: only rounding differs.
     assert again.similarity == pytest.approx(once.similarity, abs=0.02)
 
 

@@ -15,10 +15,12 @@ import pytest
 
 from core.encode import EncodedBurst
 from core.errors import InvalidInput, Unavailable
-from core.evidence import sample_patches
+from core.evidence import merged, part_tokens
 from store.folders import FileSum
 from store.memory import Memory
 from store.records import Category
+
+from .conftest import DIM, VIEWS
 
 Entries = dict[str, bytes]
 
@@ -244,7 +246,7 @@ def test_an_archive_of_an_earlier_version_brings_what_decisions_compare_now(
     entries = unpacked(archive)
     name = f"tokens/{category.id}.npz"
     tokens = dict(np.load(io.BytesIO(entries[name])))
-    del tokens["000000_patches"]
+    del tokens["000000_parts"]
     blobs = bytes(tokens["000000_cls"]) + bytes(tokens["000000_pooled"])
 
     def tell(manifest: dict) -> None:
@@ -252,14 +254,35 @@ def test_an_archive_of_an_earlier_version_brings_what_decisions_compare_now(
 
     second.import_archive(packed(tmp_path / "earlier.zip", with_manifest(with_entry(entries, name, npz(**tokens)), tell)))
     (first, *_) = second.instances.listed()
-    assert np.array_equal(second.instances.patches([first.id])[first.id], sample_patches(encoded))
+    assert np.array_equal(second.instances.parts([first.id])[first.id], part_tokens(encoded))
+    assert second.check().ok
+
+
+def test_patches_of_an_earlier_version_become_parts(
+    second: Memory, archive: Path, category: Category, encoded: EncodedBurst, tmp_path: Path
+) -> None:
+    entries = unpacked(archive)
+    name = f"tokens/{category.id}.npz"
+    tokens = dict(np.load(io.BytesIO(entries[name])))
+    drawn = np.random.default_rng(0).normal(size=(VIEWS, 24, DIM)).astype(np.float16)
+    tokens["000000_patches"] = np.frombuffer(drawn.tobytes(), np.uint8)
+    del tokens["000000_parts"]
+    blobs = bytes(tokens["000000_cls"]) + bytes(tokens["000000_pooled"]) + drawn.tobytes()
+
+    def tell(manifest: dict) -> None:
+        manifest.update(version=1)
+        manifest["categories"][0]["instances"][0]["tokens_sha256"] = FileSum.of(blobs).sha256
+
+    second.import_archive(packed(tmp_path / "earlier.zip", with_manifest(with_entry(entries, name, npz(**tokens)), tell)))
+    (first, *_) = second.instances.listed()
+    assert np.array_equal(second.instances.parts([first.id])[first.id], [merged(view) for view in drawn])
     assert second.check().ok
 
 
 def changes() -> dict[str, Callable[[dict], object]]:
     return {
         "another format": lambda manifest: manifest.update(format="else"),
-        "a later version": lambda manifest: manifest.update(version=2),
+        "a later version": lambda manifest: manifest.update(version=3),
         "nothing": lambda manifest: manifest.clear(),
         "no categories": lambda manifest: manifest.update(categories=[]),
         "a field nobody knows": lambda manifest: manifest.update(more=1),

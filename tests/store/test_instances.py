@@ -174,13 +174,13 @@ def fill(folder: Path, encoded: EncodedBurst, count: int) -> None:
 def reads(monkeypatch: pytest.MonkeyPatch) -> list[bytes]:
     """Patches that are taken from rows."""
     taken: list[bytes] = []
-    take = instances.patches_from_blob
+    take = instances.parts_from_blob
 
     def noted(blob: bytes, *shape: int) -> Array:
         taken.append(blob)
         return take(blob, *shape)
 
-    monkeypatch.setattr(instances, "patches_from_blob", noted)
+    monkeypatch.setattr(instances, "parts_from_blob", noted)
     monkeypatch.setattr(arrays, "read_whole", lambda *_: pytest.fail("a file of arrays is read"))
     return taken
 
@@ -215,10 +215,10 @@ def test_members_are_listed_anew_only_where_they_changed(memory: Memory, categor
     assert [each.category_id for each in memory.instances.listed()] == [category.id]
 
 
-def test_a_decision_leaves_out_damaged_patches(memory: Memory, category: Category, joined: Instance, encoded: EncodedBurst, caplog) -> None:
+def test_a_decision_leaves_out_damaged_parts(memory: Memory, category: Category, joined: Instance, encoded: EncodedBurst, caplog) -> None:
     connection = Connection(memory.folder)
     with connection.change() as db:
-        db.execute("UPDATE instances SET patches = zeroblob(length(patches)) WHERE id = ?", [joined.id])
+        db.execute("UPDATE instances SET parts = zeroblob(length(parts)) WHERE id = ?", [joined.id])
     connection.close()
     for _ in range(2):
         assert decide(memory.instances.enrolled(None), encoded).similarities[0][0] == category.id

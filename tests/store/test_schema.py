@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 import sqlite3
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,15 +14,18 @@ from sqlite_utils import Database
 
 from core.encode import EncodedBurst
 from core.errors import Conflict, Unavailable
-from core.evidence import sample_patches
+from core.evidence import merged, part_tokens
+from core.novelty import Decision
 from core.reference import Reference
 from core.views import Burst
 from store.columns import files_from_json
 from store.contents import FOLDERS
-from store.folders import sums
+from store.folders import FileSum, sums
 from store.memory import Memory
 from store.records import Category
 from store.schema import upgrade
+
+from .conftest import DIM, NOVEL, VIEWS
 
 
 @pytest.fixture
@@ -58,8 +62,29 @@ def test_what_was_learnt_is_still_known(upgraded: Memory, cup: Category, referen
 def test_tokens_that_decisions_compare_now_are_drawn_from_its_arrays(upgraded: Memory, encoded: EncodedBurst) -> None:
     by_scan, by_observation = (each.id for each in upgraded.instances.listed())
     assert list(upgraded.instances.pooled_means([by_scan, by_observation])) == [by_scan]  # the other's features were no burst's
-    assert np.array_equal(upgraded.instances.patches([by_scan])[by_scan], sample_patches(encoded))
+    assert np.array_equal(upgraded.instances.parts([by_scan])[by_scan], part_tokens(encoded))
     assert upgraded.check().ok
+
+
+def test_patches_that_were_drawn_at_random_become_parts(full: Memory, encoded: EncodedBurst) -> None:
+    """A memory of the version before parts: what was damaged by then is told as before, and no sample calibrates any more."""
+    drawn = np.random.default_rng(0).normal(size=(VIEWS, 24, DIM)).astype(np.float16)
+    cup, mug = full.instances.listed()
+    full.observations.create(
+        replace(NOVEL, decision=Decision("novel", "best", 0.3, (), rival=0.2)), full.instances.burst(cup.id), {"a": drawn}
+    )
+    full.close()
+    tokens = encoded.cls.tobytes() + encoded.pooled.tobytes()
+    with Database(full.folder / "memory.sqlite3") as db:
+        db.execute("ALTER TABLE instances RENAME COLUMN parts TO patches")
+        db.table("instances").update(cup.id, {"patches": drawn.tobytes(), "tokens_sha256": FileSum.of(tokens + drawn.tobytes()).sha256})
+        db.table("instances").update(mug.id, {"patches": drawn.tobytes(), "tokens_sha256": "0" * 64})
+        db.execute("DELETE FROM _sqlite_migrations WHERE name = 'm008_parts'")
+    with Memory.open(full.folder) as memory:
+        (parts,) = memory.instances.parts([cup.id, mug.id]).values()
+        assert np.array_equal(parts, [merged(view) for view in drawn])
+        assert [damage.id for damage in memory.check().damages] == [mug.id]
+        assert [decision.rival for decision in memory.observations.decisions(9)] == [None]
 
 
 def test_provenance_is_what_can_be_told(upgraded: Memory, cup: Category) -> None:
