@@ -38,7 +38,7 @@ GROWTH = 1.25
 ROUNDING = 1e-9
 """Added to a logarithm before it is rounded down: a memory that has just grown by GROWTH counts as grown."""
 KEPT = 512
-"""Members whose parts stay in memory, those compared last: up to 200 MB of ten views each."""
+"""Members whose parts stay in memory, those compared last: up to 100 MB of ten views each."""
 KEPT_COHORTS = 4096
 """Members whose matches with founders stay in memory: about 10 MB."""
 

@@ -28,7 +28,7 @@ from core.backbones.whitening import Whitening
 from core.encode import EncodedBurst
 from core.views import FloatArray
 
-PARTS = 6
+PARTS = 12
 """Of each view: with twice as many, or half, the figures differ by less than a hundredth."""
 DRAWN = 64
 """Patches of a view, evenly spaced, that its parts are made of: all of them make no better ones, and take ten times as long."""
@@ -42,9 +42,10 @@ MEMBERS = 2
 """Members of a category, the best matching ones, whose evidence is averaged: one alone may match by chance."""
 SHORTLIST = 5
 """Categories, the best matching first, whose evidence is computed."""
-ADAPTATION_PRIOR = 32.0
-"""Bursts for which the shipped statistics count when the memory's own move them: the covariance of few objects would be the differences
-between just these, and take them out."""
+ADAPTATION_PRIOR = 4.0
+"""Bursts for which the shipped mean counts when the memory's own moves it."""
+COVARIANCE_PRIOR = 32.0
+"""The same of the covariance: of few objects it would be the differences between just these, and take them out."""
 LEAST_VARIANCE = 1e-12
 """Added at least in every direction, so that a memory of one and the same token can be adapted to."""
 BATCH = 16
@@ -97,7 +98,7 @@ class Adaptation:
         centred = np.concatenate(tokens) - mean
         covariance = centred.T @ centred / len(centred)
         variance = float(np.trace(covariance)) / len(mean)
-        covariance = (count * covariance + ADAPTATION_PRIOR * variance * np.eye(len(mean))) / (count + ADAPTATION_PRIOR)
+        covariance = (count * covariance + COVARIANCE_PRIOR * variance * np.eye(len(mean))) / (count + COVARIANCE_PRIOR)
         variances, vectors = np.linalg.eigh(covariance)
         scaled = vectors / np.sqrt(variances.clip(0) + max(variance, LEAST_VARIANCE))
         return Adaptation(count * mean / (count + ADAPTATION_PRIOR), scaled @ vectors.T)

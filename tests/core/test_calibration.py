@@ -25,6 +25,11 @@ def test_few_samples_leave_the_prior_and_are_more_careful() -> None:
     assert none.threshold(0.01) > none.location + 2.33 * none.spread  # a normal distribution that is known would end there
 
 
+def test_of_what_ships_the_upper_side_counts_too() -> None:
+    skewed = Samples((0.0, 0.0, 0.0, 0.1, 0.5), PRIOR.own)
+    assert Calibration.fit([], skewed).spread == pytest.approx(np.std(skewed.rivals))
+
+
 def test_objects_falsely_called_novel_hardly_move_the_threshold() -> None:
     rivals = RNG.normal(0.1, 0.05, 300)
     clean = Calibration.fit(rivals, PRIOR)
