@@ -78,8 +78,8 @@ def varied(objects: int) -> dict[str, Choice]:
     today = Choice()
     return {
         "today's": today,
-        **{f"parts of a view: {count}": replace(today, parts=count) for count in (1, 3, 12, 24)},
-        **{f"patches of a view, drawn at random: {count}": replace(today, parts=count, drawn=True) for count in (6, 24, 96)},
+        **{f"parts of a view: {count}": replace(today, parts=count) for count in (1, 3, 6, 24)},
+        **{f"patches of a view, drawn at random: {count}": replace(today, parts=count, drawn=True) for count in (12, 24, 96)},
         **{f"statistics of objects: {count}": replace(today, adapted=count) for count in (0, 8, objects)},
         **{f"deviations: {each}": replace(today, deviations=each) for each in (0.0, 1.0, 2.0, 4.0)},
     }

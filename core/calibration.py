@@ -110,14 +110,14 @@ class Calibration:
     def fit(rivals: Sequence[float], prior: Samples) -> Calibration:
         """From the memory's own rivals, of which there may be none, and the shipped samples.
 
-        Location is the median of all. Of what ships it is known which category is wrong, so the variance is the usual one; of the memory's own
-        the square of how far the lower quantile is from the median: an object that was called novel though its category is known counts
-        among the rivals with too much evidence, and must not move the threshold.
+        Location is the median of all. Of what ships it is known which category is wrong, so the variance is the usual one; of the memory's
+        own the square of how far the lower quantile is from the median: an object that was called novel though its category is known
+        counts among the rivals with too much evidence, and must not move the threshold.
         """
         shipped, own = np.asarray(prior.rivals), np.asarray(rivals, dtype=float)
         weights = np.concatenate([np.full(len(shipped), PRIOR_SAMPLES / len(shipped)), np.ones(len(own))])
         (middle,) = _quantiles(np.concatenate([shipped, own]), weights, (0.5,))
-        squares = PRIOR_SAMPLES * float(shipped.var())
+        squares = PRIOR_SAMPLES * float(shipped.var(ddof=1))
         if len(own):
             low, own_middle = _quantiles(own, np.ones(len(own)), (LOWER, 0.5))
             squares += len(own) * (own_middle - low) ** 2

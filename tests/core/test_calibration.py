@@ -27,7 +27,7 @@ def test_few_samples_leave_the_prior_and_are_more_careful() -> None:
 
 def test_of_what_ships_the_upper_side_counts_too() -> None:
     skewed = Samples((0.0, 0.0, 0.0, 0.1, 0.5), PRIOR.own)
-    assert Calibration.fit([], skewed).spread == pytest.approx(np.std(skewed.rivals))
+    assert Calibration.fit([], skewed).spread == pytest.approx(np.std(skewed.rivals, ddof=1))
 
 
 def test_objects_falsely_called_novel_hardly_move_the_threshold() -> None:
