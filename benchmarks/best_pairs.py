@@ -75,6 +75,8 @@ class BestSource:
         self._founder = np.zeros((thresholds, self._room), dtype=np.intp)
         self._best = np.full((len(STAGES), thresholds, self._room, bursts), -np.inf, dtype=np.float32)
         self._held: list[int] = []
+        self.tried = np.zeros((thresholds, 0), dtype=np.intp)
+        """The categories whose poses the last decision tried, shape (T, up to VERIFIED)."""
 
     def nearest(self, burst: int, used: IntArray) -> tuple[IntArray, FloatArray]:
         """See `Source`."""
@@ -87,7 +89,7 @@ class BestSource:
         Args:
             used: number of categories, shape (T,).
             without: a category of each memory that is left out, −1 for none, shape (T,).
-            verify: the only categories whose poses take part, as of `verified`; those with the most evidence here where left out.
+            verify: the only categories whose poses take part, as of `tried`; those with the most evidence here where left out.
         """
         most = max(int(used.max()), 1)
         there = (np.arange(most) < used[:, None]) & (np.arange(most) != without[:, None])
@@ -96,8 +98,12 @@ class BestSource:
         shortlist = np.argsort(-raw, axis=1, kind="stable")[:, :SHORTLIST]
         there_short = np.isfinite(np.take_along_axis(raw, shortlist, axis=1))
         evidence = np.where(there_short, self._by_tokens(stage, burst, shortlist, there), -np.inf)
+        if verify is None:
+            place = np.argsort(-evidence, axis=1, kind="stable")[:, :VERIFIED]
+            verify = self.tried = np.take_along_axis(shortlist, place, axis=1)
         if self._agreement is not None:
-            evidence = evidence + self._verification(burst, shortlist, evidence, verify)
+            gained = self._agreement[np.take_along_axis(self._founder, shortlist, axis=1), burst]
+            evidence = evidence + np.where((shortlist[:, :, None] == verify[:, None, :]).any(axis=2), gained, 0.0)
         order = np.argsort(-evidence, axis=1, kind="stable")
         return np.take_along_axis(shortlist, order, axis=1), np.take_along_axis(evidence, order, axis=1)
 
@@ -125,20 +131,3 @@ class BestSource:
         is_one = np.isfinite(own)
         evidence = np.where(is_one, np.where(is_one, own, 0) - (of_burst[:, :, None] + of_member) / 2, 0.0)
         return np.asarray(evidence.sum(axis=2) / np.maximum(is_one.sum(axis=2), 1))
-
-    def _verification(self, burst: int, shortlist: IntArray, evidence: FloatArray, verify: IntArray | None) -> FloatArray:
-        """What poses add to the evidence, shape (T, S); `verify` as of `ranked`."""
-        assert self._agreement is not None
-        gained = self._agreement[np.take_along_axis(self._founder, shortlist, axis=1), burst]
-        if verify is None:
-            place = np.argsort(np.argsort(-evidence, axis=1, kind="stable"), axis=1)
-            return np.where(place < VERIFIED, gained, 0.0)
-        return np.where((shortlist[:, :, None] == verify[:, None, :]).any(axis=2), gained, 0.0)
-
-    def verified(self, burst: int, used: IntArray) -> IntArray:
-        """The categories whose poses a decision tries, shape (T, up to VERIFIED)."""
-        kept, self._agreement = self._agreement, None
-        try:
-            return self.ranked(burst, used, np.full(len(used), -1))[0][:, :VERIFIED]
-        finally:
-            self._agreement = kept

@@ -107,7 +107,7 @@ def _best_wrong(
     """Evidence for the best category that is wrong as far as the decision tells, shape (T,)."""
     if not known.any():
         return evidence
-    _, others = source.ranked(burst, used, np.where(known, chosen, -1), source.verified(burst, used))
+    _, others = source.ranked(burst, used, np.where(known, chosen, -1), source.tried)
     return np.where(known, others[:, 0], evidence)
 
 

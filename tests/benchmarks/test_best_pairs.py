@@ -69,7 +69,7 @@ def test_poses_count_for_the_three_with_the_most_evidence_by_their_founders(pair
     filled(verified)
     before, after = (dict(zip(*(each[0].tolist() for each in source.ranked(12, used, np.array([-1]))))) for source in (alone, verified))
     shortlist = sorted(before, key=lambda category: -before[category])[:3]
-    assert sorted(verified.verified(12, used)[0].tolist()) == sorted(shortlist)
+    assert sorted(verified.tried[0].tolist()) == sorted(shortlist)
     for category in before:
         founder = CHOSEN.index(category)
         gained = PRIOR.agreement_weight * pairs.agreements()[founder, 12] if category in shortlist else 0
