@@ -16,7 +16,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 
 import numpy as np
@@ -52,6 +52,16 @@ class Samples:
     """Of the best wrong category."""
     own: tuple[float, ...]
     """Of the right category, by other instances of it."""
+
+    @cached_property
+    def variance(self) -> float:
+        """Of the rivals, unbiased."""
+        return float(np.var(self.rivals, ddof=1))
+
+    @cached_property
+    def own_location(self) -> float:
+        """Median evidence for the right category."""
+        return float(np.median(self.own))
 
 
 @dataclass(frozen=True)
@@ -117,12 +127,12 @@ class Calibration:
         shipped, own = np.asarray(prior.rivals), np.asarray(rivals, dtype=float)
         weights = np.concatenate([np.full(len(shipped), PRIOR_SAMPLES / len(shipped)), np.ones(len(own))])
         (middle,) = _quantiles(np.concatenate([shipped, own]), weights, (0.5,))
-        squares = PRIOR_SAMPLES * float(shipped.var(ddof=1))
+        squares = PRIOR_SAMPLES * prior.variance
         if len(own):
             low, own_middle = _quantiles(own, np.ones(len(own)), (LOWER, 0.5))
             squares += len(own) * (own_middle - low) ** 2
         total = PRIOR_SAMPLES + len(own)
-        return Calibration(middle, max(float(np.sqrt(squares / total)), LEAST_SPREAD), total - 1, float(np.median(prior.own)))
+        return Calibration(middle, max(float(np.sqrt(squares / total)), LEAST_SPREAD), total - 1, prior.own_location)
 
     def threshold(self, rate: float) -> float:
         """What an object of no known category exceeds with this probability."""
