@@ -54,6 +54,11 @@ class Samples:
     """Of the right category, by other instances of it."""
 
     @cached_property
+    def location(self) -> float:
+        """Median of the rivals."""
+        return float(np.median(self.rivals))
+
+    @cached_property
     def variance(self) -> float:
         """Of the rivals, unbiased."""
         return float(np.var(self.rivals, ddof=1))
@@ -120,17 +125,18 @@ class Calibration:
     def fit(rivals: Sequence[float], prior: Samples) -> Calibration:
         """From the memory's own rivals, of which there may be none, and the shipped samples.
 
-        Location is the median of all. Of what ships it is known which category is wrong, so the variance is the usual one; of the memory's
-        own the square of how far the lower quantile is from the median: an object that was called novel though its category is known
-        counts among the rivals with too much evidence, and must not move the threshold.
+        Location is the median of all, and the spread is about it: where the memory's own samples are elsewhere than what ships, it cannot yet
+        be told which is right. Of what ships it is known which category is wrong, so both sides count; of the memory's own the lower side
+        alone: an object that was called novel though its category is known counts among the rivals with too much evidence, and must not
+        move the threshold.
         """
         shipped, own = np.asarray(prior.rivals), np.asarray(rivals, dtype=float)
         weights = np.concatenate([np.full(len(shipped), PRIOR_SAMPLES / len(shipped)), np.ones(len(own))])
         (middle,) = _quantiles(np.concatenate([shipped, own]), weights, (0.5,))
-        squares = PRIOR_SAMPLES * prior.variance
+        squares = PRIOR_SAMPLES * (prior.variance + (prior.location - middle) ** 2)
         if len(own):
             low, own_middle = _quantiles(own, np.ones(len(own)), (LOWER, 0.5))
-            squares += len(own) * (own_middle - low) ** 2
+            squares += len(own) * ((own_middle - low) ** 2 + (own_middle - middle) ** 2)
         total = PRIOR_SAMPLES + len(own)
         return Calibration(middle, max(float(np.sqrt(squares / total)), LEAST_SPREAD), total - 1, prior.own_location)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
 from core.calibration import Calibration, Prior, Samples
 
@@ -13,7 +14,7 @@ PRIOR = Samples(tuple(np.random.default_rng(1).normal(0.5, 0.3, 20)), (2.0, 2.5)
 
 @pytest.mark.parametrize("rate", [0.01, 0.05])
 def test_many_samples_of_its_own_give_the_quantile_asked_for(rate: float) -> None:
-    rivals = RNG.normal(0.1, 0.05, 2000)
+    rivals = RNG.normal(0.1, 0.05, 20_000)
     threshold = Calibration.fit(rivals, PRIOR).threshold(rate)
     assert rate / 2 < (RNG.normal(0.1, 0.05, 200_000) > threshold).mean() < rate * 2
 
@@ -28,6 +29,13 @@ def test_few_samples_leave_the_prior_and_are_more_careful() -> None:
 def test_of_what_ships_the_upper_side_counts_too() -> None:
     skewed = Samples((0.0, 0.0, 0.0, 0.1, 0.5), PRIOR.own)
     assert Calibration.fit([], skewed).spread == pytest.approx(np.std(skewed.rivals, ddof=1))
+
+
+@pytest.mark.parametrize("count", [10, 30, 100])
+def test_a_memory_where_all_is_more_alike_than_what_ships_keeps_the_rate(count: int) -> None:
+    prior = Samples(tuple(norm.ppf((np.arange(20) + 0.5) / 20)), PRIOR.own)
+    thresholds = [Calibration.fit(RNG.normal(2, 1, count), prior).threshold(0.01) for _ in range(200)]
+    assert np.mean(norm.sf(np.array(thresholds) - 2)) < 0.02
 
 
 def test_objects_falsely_called_novel_hardly_move_the_threshold() -> None:
