@@ -125,10 +125,10 @@ class Calibration:
     def fit(rivals: Sequence[float], prior: Samples) -> Calibration:
         """From the memory's own rivals, of which there may be none, and the shipped samples.
 
-        Location is the median of all, and the spread is about it: where the memory's own samples are elsewhere than what ships, it cannot yet
-        be told which is right. Of what ships it is known which category is wrong, so both sides count; of the memory's own the lower side
-        alone: an object that was called novel though its category is known counts among the rivals with too much evidence, and must not
-        move the threshold.
+        Location is the median of all, and the spread is about it: where the memory's own samples are elsewhere than what ships, it cannot
+        yet be told which is right. Of what ships it is known which category is wrong, so both sides count; of the memory's own the lower
+        side alone: an object that was called novel though its category is known counts among the rivals with too much evidence, and must
+        not move the threshold.
         """
         shipped, own = np.asarray(prior.rivals), np.asarray(rivals, dtype=float)
         weights = np.concatenate([np.full(len(shipped), PRIOR_SAMPLES / len(shipped)), np.ones(len(own))])

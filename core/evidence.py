@@ -30,8 +30,8 @@ from core.views import FloatArray
 
 PARTS = 12
 """Of each view: with twice as many, or half, the figures differ by less than a hundredth."""
-DRAWN = 64
-"""Patches of a view, evenly spaced, that its parts are made of: all of them make no better ones, and take ten times as long."""
+TAKEN = 64
+"""Patches of a view, evenly spaced, that its parts are made of: all of them make no better ones, and take longer, with their square."""
 COHORT = 32
 """Other categories that tell how well a burst matches anything: the oldest, so that they stay the same while a memory grows."""
 COHORT_PRIOR = 3.0
@@ -49,7 +49,7 @@ COVARIANCE_PRIOR = 32.0
 LEAST_VARIANCE = 1e-12
 """Added at least in every direction, so that a memory of one and the same token can be adapted to."""
 BATCH = 16
-"""Bursts matched at once: about 10 MB with ten views a side."""
+"""Bursts matched at once: about 4 MB with ten views a side."""
 
 
 def part_tokens(encoded: EncodedBurst, parts: int = PARTS) -> NDArray[np.float16]:
@@ -65,9 +65,9 @@ def merged(tokens: FloatArray, parts: int = PARTS) -> NDArray[np.float16]:
 
     Where there are fewer clusters they are repeated.
     """
-    drawn = tokens[np.unique(np.linspace(0, len(tokens) - 1, DRAWN).round().astype(int))].astype(np.float32)
-    part_of = fcluster(linkage(drawn, "ward"), parts, "maxclust") if len(drawn) > 1 else np.ones(1)
-    means = np.stack([drawn[part_of == part].mean(axis=0) for part in np.unique(part_of)])
+    taken = tokens[np.unique(np.linspace(0, len(tokens) - 1, TAKEN).round().astype(int))].astype(np.float32)
+    part_of = fcluster(linkage(taken, "ward"), parts, "maxclust") if len(taken) > 1 else np.ones(1)
+    means = np.stack([taken[part_of == part].mean(axis=0) for part in np.unique(part_of)])
     return np.asarray(means[np.arange(parts) % len(means)], dtype=np.float16)
 
 

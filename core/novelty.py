@@ -166,7 +166,7 @@ def _by_evidence(memory: Sequence[Member] | Enrolled, target: EncodedBurst, conf
         return tuple(sorted(kept, key=lambda entry: (-entry[1], entry[0])))
 
     similarities = weighed(evidence)
-    rivals = [each.rival for each in context.past if each.rival is not None and each.verified == verified]
+    rivals = [each.rival for each in context.past if each.rival is not None and (each.score, each.verified) == (BEST, verified)]
     calibration = Calibration.fit(rivals, prior.of(verified))
     levels = calibration.levels(config.false_known_rate, config.looks) if config.threshold is None else Levels(*(config.threshold,) * 3)
     best = similarities[0][1] if similarities else -np.inf

@@ -36,7 +36,9 @@ class Settings(BaseSettings):
     backbone: str = Field(EMBEDDED, description="Name of a backbone, such as `dinov2-s14`, or a folder or hub name of the DINO family.")
     device: str = Field("cpu", description="Torch device of the backbone: `cpu`, `cuda`, `cuda:1`.")
     score: str = Field(DEFAULT_SCORE, description="How similar two bursts are, for the decision.")
-    threshold: float | None = Field(None, description="Least similarity of a known object; the score's own default where left out.")
+    threshold: float | None = Field(
+        None, allow_inf_nan=False, description="Least similarity of a known object; the score's own default where left out."
+    )
     false_known_rate: float = Field(
         0.01,
         ge=SMALLEST_RATE,

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from core.evidence import merged
 from store.folders import Files, FileSum, read_whole
 
 Array = NDArray[Any]
@@ -54,11 +53,6 @@ def tokens_from_blob(blob: bytes, views: int) -> NDArray[np.float32]:
 def parts_to_blob(parts: NDArray[np.floating]) -> bytes:
     """Tokens of parts, shape (V, K, D), as bytes."""
     return np.ascontiguousarray(parts, dtype=PART_TYPE).tobytes()
-
-
-def parts_from_patches(blob: bytes, views: int, dim: int) -> bytes:
-    """Parts as of `parts_to_blob`, from patches that an earlier version drew at random. Raises ValueError where some are not finite."""
-    return parts_to_blob(np.stack([merged(view) for view in parts_from_blob(blob, views, dim)]))
 
 
 def parts_from_blob(blob: bytes, views: int, dim: int) -> NDArray[np.floating]:

@@ -12,10 +12,11 @@ from pydantic import ValidationError
 from sqlite_utils import Database
 
 from core.errors import Conflict, InvalidInput, OneLookError, Unavailable
+from core.evidence import PARTS
 from core.reference import Reference
 from store import untrusted
 from store.archive import FILE_NAME, MANIFEST, CategoryEntry, InstanceEntry, Manifest, token_name
-from store.arrays import BLOB_TYPE, Array, arrays_file, parts_from_blob, parts_from_patches
+from store.arrays import BLOB_TYPE, arrays_file, parts_from_blob
 from store.audit import record
 from store.bursts import read_burst
 from store.categories import insert_category
@@ -23,6 +24,7 @@ from store.columns import sim3_from_json
 from store.connection import Connection, Row, new_id
 from store.folders import Files, FileSum
 from store.instances import TOKENS, tokens_sha256
+from store.parts import parts_from_patches
 from store.progress import Progress, untold
 from store.records import Category
 
@@ -167,7 +169,7 @@ def _bring(connection: Connection, archive: _Archive, existing: list[Category], 
             for name in part.files:
                 (folder / name).write_bytes(archive.content(f"categories/{part.id}/{name}"))
             tokens = archive.content(f"tokens/{part.id}.npz")
-            judged[folders[part.id]] = _judge_category(folder, part, ids[part.id], manifest.fingerprint, tokens)
+            judged[folders[part.id]] = _judge_category(folder, part, ids[part.id], manifest, tokens)
 
         return write
 
@@ -190,7 +192,7 @@ def _imported(judged: _Judged, existing: list[Category]) -> Imported:
     return Imported(judged.entry.id, judged.id, name, len(judged.instances), len(judged.entry.goals), same)
 
 
-def _judge_category(folder: Path, part: CategoryEntry, category_id: str, fingerprint: str, tokens: bytes) -> _Judged:
+def _judge_category(folder: Path, part: CategoryEntry, category_id: str, manifest: Manifest, tokens: bytes) -> _Judged:
     """Reads a category as the service would. Raises InvalidInput where it cannot."""
     try:
         files = {name: entry.sum for name, entry in part.files.items()}
@@ -200,44 +202,42 @@ def _judge_category(folder: Path, part: CategoryEntry, category_id: str, fingerp
         for goal in part.goals:
             sim3_from_json(goal.target_from_reference)
         _require(len(reference.views) == len(burst), "its reference has as many views as pictures")
-        _require(reference.fingerprint == fingerprint, "its reference was made with the archive's backbone")
+        _require(reference.fingerprint == manifest.fingerprint, "its reference was made with the archive's backbone")
         _require(reference.box.extent_m.shape == (3,), "its box has three edges")
         for view in reference.views:
             _require(len(view.cells) == len(view.descriptors) == len(view.points_m), "each patch has a descriptor and a point")
-        instances = _instances(part, category_id, tokens, len(reference.views[0].cls))
+        instances = _instances(part, category_id, tokens, len(reference.views[0].cls), manifest.version)
     except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError, RecursionError, OneLookError) as error:
         about = f"category {part.id} cannot be read ({type(error).__name__}: {error})"
         raise InvalidInput(untrusted.FIELD, f"{about}; export it again") from error
     return _Judged(part, category_id, reference, instances)
 
 
-def _instances(part: CategoryEntry, category_id: str, tokens: bytes, dim: int) -> list[Row]:
+def _instances(part: CategoryEntry, category_id: str, tokens: bytes, dim: int, version: int) -> list[Row]:
     arrays = untrusted.arrays(tokens, "tokens")
     rows = []
     for index, instance in enumerate(part.instances):
+        third = "patches" if version == 1 else "parts"
+        found = [arrays.get(token_name(index, column)) for column in ("cls", "pooled", third)]
+        blobs: Row = {column: None if array is None else array.tobytes() for column, array in zip(TOKENS, found, strict=True)}
+        _require_sound(blobs, index, instance, dim, version)
+        if version == 1 and blobs["parts"] is not None:
+            blobs["parts"] = parts_from_patches(blobs["parts"], instance.views, dim, PARTS)
         pictures = f"categories/{category_id}" if instance.of_reference else None
-        own = {"id": new_id(), "category_id": category_id, "pictures": pictures}
-        rows.append(instance.model_dump(exclude={"of_reference"}) | _tokens(arrays, index, instance, dim) | own)
+        own = {"id": new_id(), "category_id": category_id, "pictures": pictures, "tokens_sha256": tokens_sha256(blobs)}
+        rows.append(instance.model_dump(exclude={"of_reference"}) | blobs | own)
     return rows
 
 
-def _tokens(arrays: Mapping[str, Array], index: int, instance: InstanceEntry, dim: int) -> Row:
-    """The columns of an instance that a backbone computed, and their checksum."""
-    found = {column: arrays.get(token_name(index, column)) for column in TOKENS}
-    patches = arrays.get(token_name(index, "patches"))
-    if patches is not None:
-        found["parts"] = patches
-    blobs: Row = {column: None if array is None else array.tobytes() for column, array in found.items()}
+def _require_sound(blobs: Row, index: int, instance: InstanceEntry, dim: int, version: int) -> None:
     _require(tokens_sha256(blobs) == instance.tokens_sha256, f"the tokens of instance {index} are what was written")
     for column in ("cls", "pooled"):
         tokens_of = np.frombuffer(blobs[column], BLOB_TYPE).reshape(instance.views, dim)
         _require(bool(np.isfinite(tokens_of).all()), f"{column} of instance {index} is finite")
     if blobs["parts"] is not None:
         parts = parts_from_blob(blobs["parts"], instance.views, dim)
+        _require(version == 1 or parts.shape[1] == PARTS, f"instance {index} has {PARTS} parts a view")
         _require(parts.shape[1] > 0 and bool(np.isfinite(parts).all()), f"the parts of instance {index} are finite")
-    if patches is not None:
-        blobs["parts"] = parts_from_patches(blobs["parts"], instance.views, dim)
-    return blobs | {"tokens_sha256": tokens_sha256(blobs)}
 
 
 def _require(holds: bool, what: str) -> None:

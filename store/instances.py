@@ -42,7 +42,7 @@ MEMBERS = """
 """
 """From an index alone: a row is long, and what is asked for lies behind its tokens."""
 AT_ONCE = 500
-"""Rows read in one go; bounds memory at about 100 MB."""
+"""Rows read in one go; bounds memory at about 60 MB."""
 log = logging.getLogger("onelook.store")
 
 

@@ -11,8 +11,9 @@ from sqlite_utils import Database, Migrations
 from sqlite_utils.db import ForeignKey
 
 from core.errors import Conflict, Unavailable
-from store.arrays import BLOB_TYPE, parts_from_patches
+from store.arrays import BLOB_TYPE
 from store.folders import partial_of, sync
+from store.parts import parts_from_patches
 
 migrations = Migrations("onelook")
 
@@ -258,18 +259,24 @@ def m007_members(db: Database) -> None:
 
 @migrations()
 def m008_parts(db: Database) -> None:
-    """Decisions compare parts, which are patches that look alike, where they compared patches drawn at random.
+    """Decisions compare 12 parts of a view, which are patches that look alike, where they compared patches drawn at random.
 
-    Evidence of before is no sample of what objects of no known category find now.
+    Parts are made of the patches that were kept. Where these are not sound they are left to be made anew; of damaged ones nothing is made,
+    so that they are told of. What an earlier decision found is no sample of what objects of no known category find now.
     """
-    db.execute("UPDATE observations SET decision = json_set(decision, '$.rival', NULL) WHERE decision IS NOT NULL")
     db.execute("ALTER TABLE instances RENAME COLUMN patches TO parts")
-    for instance in list(db.query("SELECT id FROM instances WHERE parts IS NOT NULL")):
-        row = db.table("instances").get(instance["id"])
+    for each in list(db.query("SELECT id FROM instances WHERE parts IS NOT NULL")):
+        (row,) = db.query("SELECT cls, pooled, parts, views, tokens_sha256 FROM instances WHERE id = ?", [each["id"]])
         tokens = row["cls"] + row["pooled"]
-        if hashlib.sha256(tokens + row["parts"]).hexdigest() == row["tokens_sha256"]:  # else damaged: it stays, to be told
-            parts = parts_from_patches(row["parts"], row["views"], len(row["cls"]) // BLOB_TYPE.itemsize // row["views"])
-            db.table("instances").update(row["id"], {"parts": parts, "tokens_sha256": hashlib.sha256(tokens + parts).hexdigest()})
+        if hashlib.sha256(tokens + row["parts"]).hexdigest() != row["tokens_sha256"]:
+            continue
+        try:
+            parts = parts_from_patches(row["parts"], row["views"], len(row["cls"]) // BLOB_TYPE.itemsize // row["views"], 12)
+        except (ArithmeticError, ValueError):
+            parts = None
+        sha256 = hashlib.sha256(tokens + (parts or b"")).hexdigest()
+        db.execute("UPDATE instances SET parts = ?, tokens_sha256 = ? WHERE id = ?", [parts, sha256, each["id"]])
+    db.execute("""UPDATE observations SET decision = replace(decision, '"score": "best"', '"score": "best of patches"')""")
 
 
 def _reference(table: str, column: str, other_table: str, on_delete: str) -> ForeignKey:

@@ -32,7 +32,7 @@ def _complete_tokens(connection: Connection, pictures: str) -> None:
     try:
         name, file = arrays_file(files_of(connection, pictures))
         columns = token_columns(burst_from_arrays(read_arrays(connection.root / pictures / name, file.sha256)))
-    except (NotFound, Unavailable, LookupError, StopIteration):  # damaged, or no arrays of a burst: such an instance stays as it is
+    except (NotFound, Unavailable, LookupError, StopIteration, ValueError):  # damaged, or no burst's arrays: it stays as it is
         return
     with connection.housekeeping() as db:
         for instance in list(db.query("SELECT * FROM instances WHERE parts IS NULL AND pictures = ?", [pictures])):

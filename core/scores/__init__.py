@@ -7,7 +7,7 @@ from core.offers import Offers
 from core.scores.base import Score
 
 BEST = "best"
-"""Ours is none of SCORES: it is evidence from patches and poses (`core.evidence`), whose threshold comes from a rate."""
+"""Ours is none of SCORES: it is evidence from parts and poses (`core.evidence`), whose threshold comes from a rate."""
 DEFAULT_SCORE = BEST
 SCORES: Offers[Score] = Offers(__name__)
 

@@ -2,7 +2,7 @@
 
 A file beside this one offers a score by the name that `ONELOOK_SCORE` and `onelook bench discovery --score` call it:
 `OFFERS: Mapping[str, Score] = {"name": Score(…)}`. tests/core/test_scores.py and the other tests that read SCORES try all that are offered;
-what is its own goes into a test_NAME.py beside it. What needs patches or poses is no score but evidence: `core.evidence`.
+what is its own goes into a test_NAME.py beside it. What needs parts or poses is no score but evidence: `core.evidence`.
 
 Letters: F, G views of two bursts, D token size.
 """

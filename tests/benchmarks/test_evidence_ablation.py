@@ -31,9 +31,9 @@ def test_a_hub_is_not_the_nearest_once_its_level_is_taken_off(deviations: float)
 
 def test_tables_are_symmetric_and_adapted_to_what_is_asked() -> None:
     rng = np.random.default_rng(0)
-    patches = [rng.normal(size=(2, 8, 6)).astype(np.float32) for _ in range(4)]
-    table = match_table(patches, adapted(patches, 3))
+    parts = [rng.normal(size=(2, 8, 6)).astype(np.float32) for _ in range(4)]
+    table = match_table(parts, adapted(parts, 3))
     assert np.array_equal(table, table.T)
     assert np.allclose(np.diag(table), 1, atol=1e-5)
-    assert not np.allclose(table, match_table(patches, adapted(patches, 0)), atol=1e-3)
-    assert np.array_equal(adapted(patches, 0).matrix, Adaptation.none(6).matrix)
+    assert not np.allclose(table, match_table(parts, adapted(parts, 0)), atol=1e-3)
+    assert np.array_equal(adapted(parts, 0).matrix, Adaptation.none(6).matrix)

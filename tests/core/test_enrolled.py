@@ -11,12 +11,13 @@ from core.backbones.whitening import Whitening
 from core.encode import EncodedBurst
 from core.enrolled import ADAPTED_FROM, EXACT, NEAREST, Enrolled, adapted_from
 from core.errors import InvalidInput
+from core.evidence import PARTS
 from core.nearness import Listed
 from core.novelty import Context, DecisionConfig, Member, decide
 
 from .conftest import PaintedObject
 
-DIM, VIEWS, PARTS = 48, 3, 24
+DIM, VIEWS = 48, 3
 ROOM = np.random.default_rng(1).normal(size=(400, DIM))
 """Directions of tokens, one a kind of thing."""
 WHITENING = Whitening.fit(np.random.default_rng(2).normal(size=(500, DIM)) * np.linspace(0.5, 2, DIM) + 0.3)

@@ -29,12 +29,12 @@ AXES = torch.eye(6)
 USUAL = Usual(0.2, 0.05)
 
 
-def views(*patches: list[int]) -> torch.Tensor:
-    """One view for each list, whose patches are the axes of these numbers, shape (V, K, 6)."""
-    return torch.stack([AXES[each] for each in patches])
+def views(*parts: list[int]) -> torch.Tensor:
+    """One view for each list, whose parts are the axes of these numbers, shape (V, K, 6)."""
+    return torch.stack([AXES[each] for each in parts])
 
 
-def test_a_view_matches_by_its_patches_and_a_burst_by_its_best_views() -> None:
+def test_a_view_matches_by_its_parts_and_a_burst_by_its_best_views() -> None:
     assert match_views(views([0, 1]), [views([0, 1])])[0] == 1
     assert match_views(views([0, 1]), [views([0, 2])])[0] == 0.5
     # The second view finds nothing; the first finds its like, and the other side's only view finds it too.
@@ -62,10 +62,10 @@ def test_a_match_speaks_above_the_mean_and_deviations_of_the_cohort_beside_what_
 def test_only_the_oldest_categories_are_the_cohort() -> None:
     """Whatever the rest are, the evidence is the same."""
     generator = torch.Generator().manual_seed(0)
-    patches = [torch.nn.functional.normalize(torch.randn(2, 3, 6, generator=generator), dim=-1) for _ in range(COHORT + 20)]
-    entries = [Entry(f"{index}", each) for index, each in enumerate(patches)]
-    far = [Entry(entry.category_id, -patches[0][:1]) for entry in entries[COHORT:]]
-    asked = patches[3] + 0.01
+    parts = [torch.nn.functional.normalize(torch.randn(2, 3, 6, generator=generator), dim=-1) for _ in range(COHORT + 20)]
+    entries = [Entry(f"{index}", each) for index, each in enumerate(parts)]
+    far = [Entry(entry.category_id, -parts[0][:1]) for entry in entries[COHORT:]]
+    asked = parts[3] + 0.01
     found = [dict(Comparison.between(asked, entries[:COHORT] + rest, USUAL).ranked())["3"] for rest in ([], far, entries[COHORT:])]
     assert found[1:] == pytest.approx([found[0]] * 2)
 

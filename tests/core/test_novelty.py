@@ -49,7 +49,7 @@ ROOM = np.random.default_rng(1).normal(size=(12, 384))
 
 
 def kind_of_tokens(kind: int, seed: int, views: int = 4) -> np.ndarray:
-    """Patches, shape (V, K, D), of an instance: its kind's tokens, somewhat its own, view by view."""
+    """Parts, shape (V, K, D), of an instance: its kind's tokens, somewhat its own, view by view."""
     rng = np.random.default_rng([kind, seed])
     own = ROOM[kind] + 0.2 * rng.normal(size=384)
     return own + 0.3 * rng.normal(size=(views, PARTS, 384))
@@ -97,7 +97,7 @@ def test_evidence_does_not_depend_on_how_often_a_view_is_sent(painted: PaintedOb
     twice = EncodedBurst(burst.views + burst.views, "painted")
     once, again = decide(SIX_KINDS, burst), decide(SIX_KINDS, twice)
     # The same parts, and statistics that do not count views twice: only rounding differs.
-    assert again.similarity == pytest.approx(once.similarity, abs=0.02)
+    assert again.similarity == pytest.approx(once.similarity, abs=1e-5)
 
 
 def test_verification_adds_evidence_for_the_shortlist_only(painted: PaintedObject) -> None:

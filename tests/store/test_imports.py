@@ -240,43 +240,53 @@ def test_tokens_must_be_numbers_of_the_reference_s_size(second: Memory, archive:
     assert nothing_changed(second)
 
 
+def of_version_1(entries: Entries, patches: bytes | None) -> Entries:
+    """The same archive as the version before parts wrote it: with these patches of every instance, or none."""
+    manifest = json.loads(entries["manifest.json"]) | {"version": 1}
+    for part in manifest["categories"]:
+        name = f"tokens/{part['id']}.npz"
+        tokens = dict(np.load(io.BytesIO(entries[name])))
+        for index, instance in enumerate(part["instances"]):
+            del tokens[f"{index:06d}_parts"]
+            if patches is not None:
+                tokens[f"{index:06d}_patches"] = np.frombuffer(patches, np.uint8)
+            blobs = bytes(tokens[f"{index:06d}_cls"]) + bytes(tokens[f"{index:06d}_pooled"]) + (patches or b"")
+            instance["tokens_sha256"] = FileSum.of(blobs).sha256
+        entries = entries | {name: npz(**tokens)}
+        part["tokens"] = {"size": len(entries[name]), "sha256": FileSum.of(entries[name]).sha256}
+    return entries | {"manifest.json": json.dumps(manifest).encode()}
+
+
 def test_an_archive_of_an_earlier_version_brings_what_decisions_compare_now(
-    second: Memory, archive: Path, category: Category, encoded: EncodedBurst, tmp_path: Path
+    second: Memory, archive: Path, encoded: EncodedBurst, tmp_path: Path
 ) -> None:
-    entries = unpacked(archive)
-    name = f"tokens/{category.id}.npz"
-    tokens = dict(np.load(io.BytesIO(entries[name])))
-    del tokens["000000_parts"]
-    blobs = bytes(tokens["000000_cls"]) + bytes(tokens["000000_pooled"])
-
-    def tell(manifest: dict) -> None:
-        manifest["categories"][0]["instances"][0]["tokens_sha256"] = FileSum.of(blobs).sha256
-
-    second.import_archive(packed(tmp_path / "earlier.zip", with_manifest(with_entry(entries, name, npz(**tokens)), tell)))
+    second.import_archive(packed(tmp_path / "earlier.zip", of_version_1(unpacked(archive), None)))
     (first, *_) = second.instances.listed()
     assert np.array_equal(second.instances.parts([first.id])[first.id], part_tokens(encoded))
     assert second.check().ok
 
 
-def test_patches_of_an_earlier_version_become_parts(
-    second: Memory, archive: Path, category: Category, encoded: EncodedBurst, tmp_path: Path
-) -> None:
-    entries = unpacked(archive)
-    name = f"tokens/{category.id}.npz"
-    tokens = dict(np.load(io.BytesIO(entries[name])))
+def test_patches_of_an_earlier_version_become_parts(second: Memory, archive: Path, tmp_path: Path) -> None:
     drawn = np.random.default_rng(0).normal(size=(VIEWS, 24, DIM)).astype(np.float16)
-    tokens["000000_patches"] = np.frombuffer(drawn.tobytes(), np.uint8)
-    del tokens["000000_parts"]
-    blobs = bytes(tokens["000000_cls"]) + bytes(tokens["000000_pooled"]) + drawn.tobytes()
-
-    def tell(manifest: dict) -> None:
-        manifest.update(version=1)
-        manifest["categories"][0]["instances"][0]["tokens_sha256"] = FileSum.of(blobs).sha256
-
-    second.import_archive(packed(tmp_path / "earlier.zip", with_manifest(with_entry(entries, name, npz(**tokens)), tell)))
+    second.import_archive(packed(tmp_path / "earlier.zip", of_version_1(unpacked(archive), drawn.tobytes())))
     (first, *_) = second.instances.listed()
     assert np.array_equal(second.instances.parts([first.id])[first.id], [merged(view) for view in drawn])
     assert second.check().ok
+
+
+def test_another_number_of_parts_is_refused(second: Memory, archive: Path, category: Category, tmp_path: Path) -> None:
+    entries = unpacked(archive)
+    name = f"tokens/{category.id}.npz"
+    tokens = dict(np.load(io.BytesIO(entries[name])))
+    tokens["000000_parts"] = tokens["000000_parts"][: VIEWS * DIM * 2]
+    blobs = b"".join(bytes(tokens[f"000000_{column}"]) for column in ("cls", "pooled", "parts"))
+
+    def tell(manifest: dict) -> None:
+        manifest["categories"][0]["instances"][0]["tokens_sha256"] = FileSum.of(blobs).sha256
+
+    with pytest.raises(InvalidInput, match="parts a view"):
+        second.import_archive(packed(tmp_path / "other.zip", with_manifest(with_entry(entries, name, npz(**tokens)), tell)))
+    assert nothing_changed(second)
 
 
 def changes() -> dict[str, Callable[[dict], object]]:

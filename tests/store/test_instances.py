@@ -172,7 +172,7 @@ def fill(folder: Path, encoded: EncodedBurst, count: int) -> None:
 
 @pytest.fixture
 def reads(monkeypatch: pytest.MonkeyPatch) -> list[bytes]:
-    """Patches that are taken from rows."""
+    """Parts that are taken from rows."""
     taken: list[bytes] = []
     take = instances.parts_from_blob
 

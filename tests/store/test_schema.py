@@ -14,7 +14,7 @@ from sqlite_utils import Database
 
 from core.encode import EncodedBurst
 from core.errors import Conflict, Unavailable
-from core.evidence import merged, part_tokens
+from core.evidence import part_tokens
 from core.novelty import Decision
 from core.reference import Reference
 from core.views import Burst
@@ -67,24 +67,52 @@ def test_tokens_that_decisions_compare_now_are_drawn_from_its_arrays(upgraded: M
 
 
 def test_patches_that_were_drawn_at_random_become_parts(full: Memory, encoded: EncodedBurst) -> None:
-    """A memory of the version before parts: what was damaged by then is told as before, and no sample calibrates any more."""
-    drawn = np.random.default_rng(0).normal(size=(VIEWS, 24, DIM)).astype(np.float16)
+    """A memory of the version before parts: what was damaged by then is told as before."""
+    axes = np.eye(12, DIM * 2)[:, :DIM] + np.eye(12, DIM * 2)[:, DIM:]  # four of them are there twice
+    drawn = np.stack([np.repeat(axes, 2, axis=0)] * VIEWS).astype(np.float16)
     cup, mug = full.instances.listed()
-    full.observations.create(
-        replace(NOVEL, decision=Decision("novel", "best", 0.3, (), rival=0.2)), full.instances.burst(cup.id), {"a": drawn}
-    )
-    full.close()
-    tokens = encoded.cls.tobytes() + encoded.pooled.tobytes()
-    with Database(full.folder / "memory.sqlite3") as db:
-        db.execute("ALTER TABLE instances RENAME COLUMN parts TO patches")
-        db.table("instances").update(cup.id, {"patches": drawn.tobytes(), "tokens_sha256": FileSum.of(tokens + drawn.tobytes()).sha256})
-        db.table("instances").update(mug.id, {"patches": drawn.tobytes(), "tokens_sha256": "0" * 64})
-        db.execute("DELETE FROM _sqlite_migrations WHERE name = 'm008_parts'")
+    before_parts(full, encoded, {cup.id: drawn.tobytes()})
     with Memory.open(full.folder) as memory:
         (parts,) = memory.instances.parts([cup.id, mug.id]).values()
-        assert np.array_equal(parts, [merged(view) for view in drawn])
+        assert parts.shape == (VIEWS, 12, DIM)
+        assert {tuple(part) for part in parts[1].tolist()} == {tuple(axis) for axis in np.eye(DIM).tolist()}
         assert [damage.id for damage in memory.check().damages] == [mug.id]
-        assert [decision.rival for decision in memory.observations.decisions(9)] == [None]
+
+
+@pytest.mark.parametrize("patches", [b"", np.full((VIEWS, 24, DIM), np.nan, np.float16).tobytes(), b"12"])
+def test_where_patches_are_not_sound_parts_are_made_of_the_burst_s_arrays(full: Memory, encoded: EncodedBurst, patches: bytes) -> None:
+    cup, _ = full.instances.listed()
+    before_parts(full, encoded, {cup.id: patches})
+    with Memory.open(full.folder) as memory:
+        assert np.array_equal(memory.instances.parts([cup.id])[cup.id], part_tokens(encoded))
+
+
+def test_what_decisions_found_before_parts_is_no_sample_any_more(full: Memory, encoded: EncodedBurst) -> None:
+    cup, mug = full.instances.listed()
+    found = ((cup.category_id, 0.5), (mug.category_id, 0.2))
+    judged = replace(NOVEL, decision=Decision("novel", "best", float("inf"), found, rival=0.2))
+    seen = full.observations.create(judged, full.instances.burst(cup.id), {"a": np.zeros(1)})
+    before_parts(full, encoded, {})
+    with Memory.open(full.folder) as memory:
+        (decision,) = memory.observations.decisions(9)
+        assert (decision.score, decision.similarities) == ("best of patches", found)
+        assert decision.corrected(cup.category_id).rival is None
+        assert memory.observations.get(seen.id).decision == decision
+
+
+def before_parts(memory: Memory, encoded: EncodedBurst, patches: dict[str, bytes]) -> None:
+    """Closes a memory as the version before parts left it: with these patches, and damaged tokens of every other instance."""
+    ids = [each.id for each in memory.instances.listed()]
+    memory.close()
+    tokens = encoded.cls.tobytes() + encoded.pooled.tobytes()
+    with Database(memory.folder / "memory.sqlite3") as db:
+        db.execute("ALTER TABLE instances RENAME COLUMN parts TO patches")
+        db.execute("UPDATE instances SET tokens_sha256 = ?", ["0" * 64])
+        for each in ids:
+            if each in patches:
+                sha256 = FileSum.of(tokens + patches[each]).sha256
+                db.table("instances").update(each, {"patches": patches[each], "tokens_sha256": sha256})
+        db.execute("DELETE FROM _sqlite_migrations WHERE name = 'm008_parts'")
 
 
 def test_provenance_is_what_can_be_told(upgraded: Memory, cup: Category) -> None:
