@@ -119,15 +119,18 @@ def match_views(target: Tensor, others: Sequence[Tensor]) -> FloatArray:
     Two views match by the mean over parts of the cosine to the other's most similar part, both ways; two bursts by the mean over views
     of the match with the other's best matching view, both ways.
     """
-    found: list[float] = []
+    found = [np.zeros(0)]
     for start in range(0, len(others), BATCH):
         batch = others[start : start + BATCH]
         stacked = torch.cat(list(batch))
         cosines = (target.flatten(0, 1) @ stacked.flatten(0, 1).T).view(*target.shape[:2], *stacked.shape[:2])
-        views = (cosines.amax(dim=3).mean(dim=1) + cosines.amax(dim=1).mean(dim=2)) / 2
-        for each in torch.split(views, [len(other) for other in batch], dim=1):
-            found.append(float((each.amax(dim=0).mean() + each.amax(dim=1).mean()) / 2))
-    return np.array(found)
+        views = ((cosines.amax(dim=3).mean(dim=1) + cosines.amax(dim=1).mean(dim=2)) / 2).numpy()
+        counts = np.array([len(other) for other in batch])
+        firsts = np.cumsum(counts) - counts
+        there = np.maximum.reduceat(views, firsts, axis=1).mean(axis=0, dtype=float)
+        back = np.add.reduceat(views.max(axis=0), firsts, dtype=float) / counts
+        found.append((there + back) / 2)
+    return np.concatenate(found)
 
 
 @dataclass(frozen=True)
