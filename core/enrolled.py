@@ -28,7 +28,7 @@ from core.views import FloatArray
 T = TypeVar("T")
 
 EXACT = 64
-"""Members up to which every one is compared part by part: about 25 ms on two cores with ten views a side."""
+"""Members up to which every one is compared part by part: about 20 ms on two cores with ten views a side."""
 NEAREST = 12
 """So many members, and founders of so many categories, are compared part by part in a larger memory, beside the cohort."""
 ADAPTED_FROM = 256

@@ -215,11 +215,11 @@ def _judge_category(folder: Path, part: CategoryEntry, category_id: str, manifes
 
 def _instances(part: CategoryEntry, category_id: str, tokens: bytes, dim: int, version: int) -> list[Row]:
     arrays = untrusted.arrays(tokens, "tokens")
+    kept_as = {"parts": "patches"} if version == 1 else {}
     rows = []
     for index, instance in enumerate(part.instances):
-        third = "patches" if version == 1 else "parts"
-        found = [arrays.get(token_name(index, column)) for column in ("cls", "pooled", third)]
-        blobs: Row = {column: None if array is None else array.tobytes() for column, array in zip(TOKENS, found, strict=True)}
+        found = {column: arrays.get(token_name(index, kept_as.get(column, column))) for column in TOKENS}
+        blobs: Row = {column: None if array is None else array.tobytes() for column, array in found.items()}
         _require_sound(blobs, index, instance, dim, version)
         if version == 1 and blobs["parts"] is not None:
             blobs["parts"] = parts_from_patches(blobs["parts"], instance.views, dim, PARTS)

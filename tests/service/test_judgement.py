@@ -59,5 +59,6 @@ def test_an_uncertain_object_gets_viewpoints_and_no_category(agent, look):
     looked = agent.observe(look("dark", views=2), ObserveOptions(learn=False, false_known_rate=rate, looks=1))
     assert seen.decision.threshold == looked.decision.threshold
     assert seen.decision.uncertain_above < looked.decision.uncertain_above <= looked.decision.threshold
+    assert (looked.outcome, looked.decision.probability < 0.5) == ("novel", True)  # what is looked at and more probably wrong is novel
     assert seen.viewpoints.shape[1:] == (4, 4)
     assert agent.memory.observations.get(seen.id).viewpoints.shape == seen.viewpoints.shape

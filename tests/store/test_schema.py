@@ -59,7 +59,7 @@ def test_what_was_learnt_is_still_known(upgraded: Memory, cup: Category, referen
         assert np.array_equal(member.pooled, encoded.pooled)
 
 
-def test_tokens_that_decisions_compare_now_are_drawn_from_its_arrays(upgraded: Memory, encoded: EncodedBurst) -> None:
+def test_tokens_that_decisions_compare_now_are_made_of_its_arrays(upgraded: Memory, encoded: EncodedBurst) -> None:
     by_scan, by_observation = (each.id for each in upgraded.instances.listed())
     assert list(upgraded.instances.pooled_means([by_scan, by_observation])) == [by_scan]  # the other's features were no burst's
     assert np.array_equal(upgraded.instances.parts([by_scan])[by_scan], part_tokens(encoded))
