@@ -26,7 +26,7 @@ OBSERVE, LEARN = 0.85, 0.93
 SETTLED = 1 / 3
 """Of the time: until then allocators and caches fill."""
 PART = 1 / 6
-"""Of the time, whose median is compared at either end of the rest."""
+"""Of the time, whose least memory is compared at either end of the rest: what stays while no large request is under way."""
 SETTINGS = {"ONELOOK_KEEP_OBSERVATIONS": "50", "ONELOOK_UNDO_DAYS": "0"}
 """So that what is kept is bounded soon, as a service of years is."""
 SAMPLES_OF_A_RUN = 600
@@ -98,14 +98,14 @@ def _soak(url: str, robots: int, seconds: float, errand: Errand, seed: int) -> R
 def soak_result(minutes: float, robots: int, record: Record) -> SoakResult:
     """Compares the time after it settled with the end."""
     end = record.samples[-1].time_s
-    early = _median(record.samples, SETTLED * end, (SETTLED + PART) * end)
-    late = _median(record.samples, (1 - PART) * end, end)
+    early = _least(record.samples, SETTLED * end, (SETTLED + PART) * end)
+    late = _least(record.samples, (1 - PART) * end, end)
     answered, refused, failed = (len(record.of(fate)) for fate in FATES)
     return SoakResult(minutes, robots, answered, refused, failed, early, late, late / early - 1)
 
 
-def _median(samples: Sequence[Sample], begin_s: float, end_s: float) -> float:
-    return float(np.median([sample.resident_mb for sample in samples if begin_s <= sample.time_s <= end_s]))
+def _least(samples: Sequence[Sample], begin_s: float, end_s: float) -> float:
+    return min(sample.resident_mb for sample in samples if begin_s <= sample.time_s <= end_s)
 
 
 def living(bursts: Sequence[Burst]) -> Errand:

@@ -6,6 +6,7 @@ import asyncio
 import json
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -85,8 +86,10 @@ def grown(per_minute_mb: float) -> Record:
 def test_growth_is_of_the_settled_process() -> None:
     flat = soak.soak_result(30, 2, grown(0))
     assert (flat.early_mb, flat.late_mb, flat.growth) == (900, 900, 0)
+    busy = [replace(sample, resident_mb=sample.resident_mb + 50 * (index % 3)) for index, sample in enumerate(grown(0).samples)]
+    assert soak.soak_result(30, 2, Record([], busy)).growth == 0  # what requests under way take, they give back
     leaking = soak.soak_result(30, 2, grown(5))
-    assert leaking.growth == pytest.approx((5 * 15) / (900 + 5 * 12.5), rel=0.02)
+    assert leaking.growth == pytest.approx((5 * 15) / (900 + 5 * 10), rel=0.02)
 
 
 def test_a_process_that_grows_or_fails_is_told(url: str, recorded: Path, monkeypatch: pytest.MonkeyPatch) -> None:

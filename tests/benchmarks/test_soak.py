@@ -14,9 +14,10 @@ from benchmarks import soak
 
 ROOT = Path(__file__).parents[2]
 MINUTES = 0.75
-"""Some 450 errands where two other processes are at work; it settles within the first 200."""
-MOST_GROWTH = 0.03
-"""Of 500 MB, over the 220 errands between both ends that are compared: 70 kB an errand."""
+"""Some 450 errands where two other processes are at work."""
+MOST_GROWTH = 0.05
+"""Of 500 MB, over the 220 errands between both ends that are compared: 110 kB an errand, less than two of the images that come with it.
+Over 4,000 errands the process stays as large as it is, but allocators reach that size in steps of 10 MB."""
 
 
 @pytest.fixture
