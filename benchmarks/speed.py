@@ -1,7 +1,8 @@
 """Speed: milliseconds of every stage of one observation, side by side in one run.
 
 Operations take turns, round after round, so that whatever else the machine does falls on all of them alike; medians over the
-rounds. A ratio compares with a whole observation: encode, decide by the default score and solve with the default variant.
+rounds. A ratio compares with a whole observation: encode, and decide by `best` with all the poses that are ever tried, one of which is
+the answer.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ from core.matched_pair import MatchedPair
 from core.novelty import VERIFIED, Context, DecisionConfig, Member, decide
 from core.pose import VARIANTS, PoseConfig, PoseEstimator
 from core.reference import Reference, build_reference
-from core.scores import BEST, DEFAULT_SCORE, SCORES
+from core.scores import BEST, SCORES
 from core.verification import verify
 from core.views import Burst
 
@@ -65,8 +66,9 @@ class TargetRow:
     bound: str
 
 
-OBSERVATION = ("encode", f"decide {DEFAULT_SCORE}", f"solve {PoseConfig().variant}")
-"""The operations that one observation of a known object consists of."""
+VERIFIED_DECISION = f"decide {BEST}, {VERIFIED} poses"
+OBSERVATION = ("encode", VERIFIED_DECISION)
+"""What one observation of a known object consists of, with a service's defaults."""
 STRAIGHTFORWARD = "encode, both passes whole, in single precision"
 BARE = "encode, the bare products of both passes, whole"
 NEAR = "encode, close crop near the object only"
@@ -133,7 +135,7 @@ def _operations(
         "encode": partial(_encode, encoder, burst),
         "learn": partial(_learn, scanned),
         **{f"decide {score}": partial(_decide, memory, target, score) for score in (BEST, *SCORES)},
-        f"decide {BEST}, {VERIFIED} poses": partial(_verify, memory[0], target, reference, network.whitening),
+        VERIFIED_DECISION: partial(_verify, memory[0], target, reference, network.whitening),
         **{f"solve {name}": partial(_solve, PoseEstimator(PoseConfig.named(name)), reference, target) for name in VARIANTS},
         **{_more(name): partial(_solve, PoseEstimator(PoseConfig.named(name)), *many) for name in GROWING},
         STRAIGHTFORWARD: partial(_encode, straightforward, burst),

@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
+from itertools import islice
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -31,13 +32,8 @@ def fill(folder: Path, bursts: Iterable[EncodedBurst]) -> None:
     with Memory.open(folder) as memory:
         if not memory.categories.all():
             _live_through(memory)
-    several: list[EncodedBurst] = []
-    for burst in bursts:
-        several.append(burst)
-        if len(several) == AT_ONCE:
-            _insert(folder, several)
-            several = []
-    _insert(folder, several)
+    for several in _several(bursts):
+        _insert(folder, several)
 
 
 def measure(probe: Probe) -> GrowthRow:
@@ -155,37 +151,50 @@ def _answers(memory: Memory, probe: Probe, decisions: Sequence[Decision], whiten
 
 def exact_best(memory: Memory, bursts: Sequence[EncodedBurst], whitening: Any) -> list[tuple[str, float]]:
     """The most similar category of each burst and its similarity, with every member compared part by part."""
-    import numpy as np
-
     from core.calibration import Prior
     from core.enrolled import adapted_from
     from core.evidence import Adaptation, Comparison, match_views, part_tokens, whitened
 
     members = memory.instances.listed()
-    sample = [members[place].id for place in adapted_from(len(members))]
-    read = memory.instances.parts(sample)
-    adaptation = Adaptation.fit([whitened(read[each], whitening) for each in sample])
-    targets = [adaptation.directions(whitened(part_tokens(burst), whitening)) for burst in bursts]
+    names = [member.id for member in members]
 
-    found: list[list[Any]] = [[] for _ in targets]
-    for start in range(0, len(members), AT_ONCE):
-        some = [member.id for member in members[start : start + AT_ONCE]]
+    def tokens(some: Sequence[str]) -> list[Any]:
         parts = memory.instances.parts(some)
-        directions = [adaptation.directions(whitened(parts[each], whitening)) for each in some]
-        for target, matches in zip(targets, found):
-            matches.append(match_views(target, directions))
+        return [whitened(parts[each], whitening) for each in some]
+
+    adaptation = Adaptation.fit(tokens([names[place] for place in adapted_from(len(names))]))
 
     @cache
     def directions_of(place: int) -> Any:
-        name = members[place].id
-        return adaptation.directions(whitened(memory.instances.parts([name])[name], whitening))
+        return adaptation.directions(tokens([names[place]])[0])
 
     def of_member(place: int, founders: Sequence[int]) -> list[float]:
         return match_views(directions_of(place), [directions_of(each) for each in founders]).tolist()
 
-    categories = [member.category_id for member in members]
-    usual = Prior.shipped().usual
-    return [Comparison.of(categories, np.concatenate(matches), of_member, usual).ranked()[0] for matches in found]
+    targets = [adaptation.directions(whitened(part_tokens(burst), whitening)) for burst in bursts]
+    matches = _matches(targets, (map(adaptation.directions, tokens(some)) for some in _several(names)))
+    categories, usual = [member.category_id for member in members], Prior.shipped().usual
+    return [Comparison.of(categories, each, of_member, usual).ranked()[0] for each in matches]
+
+
+def _matches(targets: Sequence[Any], members: Iterable[Iterable[Any]]) -> list[Any]:
+    """Of each target with all members, which come several at once."""
+    import numpy as np
+
+    from core.evidence import match_views
+
+    found: list[list[Any]] = [[] for _ in targets]
+    for directions in map(list, members):
+        for target, matches in zip(targets, found):
+            matches.append(match_views(target, directions))
+    return [np.concatenate(matches) for matches in found]
+
+
+def _several(values: Iterable[T]) -> Iterator[list[T]]:
+    """AT_ONCE of them, and again."""
+    left = iter(values)
+    while some := list(islice(left, AT_ONCE)):
+        yield some
 
 
 def _nearness(memory: Memory) -> Any:
