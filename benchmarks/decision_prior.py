@@ -28,7 +28,7 @@ from clients.datasets.folders import find_sequences
 from core.backbones import load_backbone
 from core.calibration import SHIPPED
 from core.encode import Encoder
-from core.evidence import MEMBERS, Usual, cohort_level
+from core.evidence import MEMBERS, Comparison, Matched, Usual
 from core.views import FloatArray
 
 
@@ -52,7 +52,10 @@ def write(out: Path, fingerprint: str, labels: NDArray[np.intp], match: FloatArr
         match: matches of all pairs, shape (N, N).
         agreement: of the reference of burst i with burst j at the best pose, shape (N, N); all bursts must have depth and cameras.
     """
-    others = np.concatenate([match[_founders(labels, burst, labels[burst]), burst] for burst in range(len(labels))])
+    founders = [_founders(labels, burst) for burst in range(len(labels))]
+    others = np.array(
+        [match[founder, burst] for burst, each in enumerate(founders) for kind, founder in each.items() if kind != labels[burst]]
+    )
     usual = Usual(round(float(others.mean()), 4), round(float(others.std()), 4))
     wrong: list[list[tuple[float, float]]] = []
     own: list[tuple[float, float]] = []
@@ -81,10 +84,15 @@ def write(out: Path, fingerprint: str, labels: NDArray[np.intp], match: FloatArr
 
 def _evidence(match: FloatArray, labels: NDArray[np.intp], burst: int, category: int, usual: Usual) -> float:
     """Evidence of a burst for a category, all other bursts being in the memory, but of its own category only if that is asked about."""
+    own, founders = labels[burst], _founders(labels, burst)
+
+    def cohort(each: int) -> dict[str, float]:
+        return {str(other): float(match[founder, each]) for other, founder in founders.items()}
+
     members = sorted(_others(labels, burst, category), key=lambda index: -match[index, burst])[:MEMBERS]
-    founders = [founder for founder in _founders(labels, burst, category) if labels[founder] != labels[burst]]
-    of_burst, *of_members = (float(cohort_level(match[founders, each], usual)) for each in (burst, *members))
-    return float(np.mean([match[member, burst] - (of_burst + level) / 2 for member, level in zip(members, of_members)]))
+    matched = {str(category): [Matched(float(match[member, burst]), cohort(member)) for member in members]}
+    ((_, evidence),) = Comparison(matched, cohort(burst), usual).ranked(without=None if category == own else str(own))
+    return evidence
 
 
 def _others(labels: NDArray[np.intp], burst: int, category: int) -> list[int]:
@@ -92,9 +100,10 @@ def _others(labels: NDArray[np.intp], burst: int, category: int) -> list[int]:
     return [int(index) for index in np.flatnonzero(labels == category) if index != burst]
 
 
-def _founders(labels: NDArray[np.intp], burst: int, without: int) -> list[int]:
-    """The first burst of each category but one, as if the burst that is compared were not there."""
-    return [_others(labels, burst, each)[0] for each in sorted(set(labels.tolist())) if each != without and _others(labels, burst, each)]
+def _founders(labels: NDArray[np.intp], burst: int) -> dict[int, int]:
+    """The first burst of each category, as if the burst that is compared were not there."""
+    others = {each: _others(labels, burst, each) for each in sorted(set(labels.tolist()))}
+    return {each: bursts[0] for each, bursts in others.items() if bursts}
 
 
 def _rounded(values: Sequence[float]) -> list[float]:
