@@ -48,9 +48,9 @@ def report(title: str, rows: Sequence[DataclassInstance], meta: Meta, json: Path
 
 def print_table(title: str, rows: Sequence[Row], columns: Sequence[str]) -> None:
     """Prints `columns` of `rows`; a value that does not exist (None, or not finite) prints as a dash."""
-    console = Console()
+    console = Console(markup=False, emoji=False)  # names may have brackets
     if not console.is_terminal:
-        console = Console(width=FILE_WIDTH)
+        console.width = FILE_WIDTH
     table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
     for column in columns:
         cells = [_cell(row.get(column)) for row in rows]

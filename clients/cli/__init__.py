@@ -9,7 +9,7 @@ from importlib.metadata import version
 from typing import Annotated, Any
 
 import typer
-from rich.markup import escape
+from rich.text import Text
 from typer.core import TyperGroup
 
 from clients.cli import bench, categories, doctor, keys, memory, rearrange, recordings, render, robot, service, simulate
@@ -28,17 +28,13 @@ class OneLookGroup(TyperGroup):
         try:
             return super().invoke(ctx)
         except OneLookError as error:
-            errors.print(f"[bold red]error:[/] {escape(str(error))}", highlight=False, soft_wrap=True)
+            _say_error(str(error))
             raise typer.Exit(1) from None
         except ModuleNotFoundError as error:
             library = (error.name or "").split(".")[0]
             if library in OWN:
                 raise
-            errors.print(
-                f"[bold red]error:[/] this command needs {library}, which is not installed; run: pip install 'onelook\\[server]'",
-                highlight=False,
-                soft_wrap=True,
-            )
+            _say_error(f"this command needs {library}, which is not installed; run: pip install 'onelook[server]'")
             raise typer.Exit(1) from None
 
 
@@ -49,6 +45,10 @@ app = typer.Typer(
     no_args_is_help=True,
     pretty_exceptions_show_locals=False,
 )
+
+
+def _say_error(sentence: str) -> None:
+    errors.print(Text.assemble(("error: ", "bold red"), sentence), soft_wrap=True)
 
 
 def _say_version(asked: bool) -> None:

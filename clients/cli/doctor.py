@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
-from rich.markup import escape
+from rich.text import Text
 
 from clients.cli.service import read_settings
 from clients.cli.terminal import Json, console, errors, print_json, print_table
@@ -62,14 +62,14 @@ def doctor(json: Json = False) -> None:
     with errors.status("looking") as status:
         for finding in examine():
             findings.append(finding)
-            status.update(f"looking; {finding.what}: {escape(finding.found)}")
+            status.update(Text(f"looking; {finding.what}: {finding.found}"))
     if json:
         print_json([asdict(finding) for finding in findings])
     else:
         print_table([_row(finding) for finding in findings], "nothing to look at")
         for finding in findings:
             if finding.remedy:
-                console.print(f"\n[bold]{finding.what}[/]: {escape(finding.remedy)}", highlight=False, soft_wrap=True)
+                console.print(Text.assemble("\n", (finding.what, "bold"), f": {finding.remedy}"), soft_wrap=True)
     if any(finding.state is State.bad for finding in findings):
         raise typer.Exit(1)
 
@@ -240,6 +240,6 @@ def _nearest_folder(path: Path) -> Path:
     return next(each for each in (path, *path.absolute().parents) if each.exists())
 
 
-def _row(finding: Finding) -> dict[str, str]:
-    mark = {State.good: "[green]good[/]", State.poor: "[yellow]poor[/]", State.bad: "[bold red]bad[/]"}[finding.state]
-    return {"": mark, "what": finding.what, "found": escape(finding.found)}
+def _row(finding: Finding) -> dict[str, str | Text]:
+    style = {State.good: "green", State.poor: "yellow", State.bad: "bold red"}[finding.state]
+    return {"": Text(finding.state.value, style), "what": finding.what, "found": finding.found}

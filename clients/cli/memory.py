@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from rich.text import Text
 
 from clients.cli.categories import find
 from clients.cli.service import read_settings
@@ -177,7 +178,8 @@ def _folder_with_memory(data_dir: Path | None) -> Path:
 def _print_damages(damages: tuple[Damage, ...]) -> None:
     for damage in damages:
         called = f"{damage.kind} {damage.name or damage.id or ''}".strip()
-        console.print(f"[bold red]{called}[/]: {damage.file}: {damage.problem}. {damage.consequence}", soft_wrap=True)
+        said = f": {damage.file}: {damage.problem}. {damage.consequence}"
+        console.print(Text.assemble((called, "bold red"), said), soft_wrap=True)
 
 
 def _verdict(damages: tuple[Damage, ...]) -> str:

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from rich.text import Text
 
 from clients.cli.terminal import SOURCE, Json, console, errors, print_json, progress_bar
 
@@ -39,7 +40,7 @@ def convert(
     from clients.datasets.convert import convert as write
     from clients.datasets.sources import find_sequences
 
-    with errors.status(f"reading {source}"):
+    with errors.status(Text(f"reading {source}")):
         sequences = find_sequences(source)
     written = list(progress_bar(write(sequences, out), "converting", len(sequences)))
     if json:

@@ -12,14 +12,16 @@ import typer
 from rich.console import Console
 from rich.progress import Progress, track
 from rich.table import Table
+from rich.text import Text
 
 from clients.robot import DEFAULT_URL
 
 T = TypeVar("T")
 LOG_WIDTH = 120
 """Characters a line where the output is no terminal: nothing says how wide a file is."""
-console = Console(width=None if sys.stdout.isatty() else LOG_WIDTH)
-errors = Console(stderr=True)
+console = Console(width=None if sys.stdout.isatty() else LOG_WIDTH, markup=False, emoji=False)
+errors = Console(stderr=True, markup=False, emoji=False)
+"""Both print text as it is: names and paths may have brackets and colons."""
 
 Url = Annotated[str, typer.Option(help="Address of the service.", envvar="ONELOOK_URL")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for programs.")]
@@ -52,7 +54,7 @@ def print_json(value: object) -> None:
     typer.echo(json.dumps(value, indent=1))
 
 
-def print_table(rows: Sequence[Mapping[str, str]], empty: str) -> None:
+def print_table(rows: Sequence[Mapping[str, str | Text]], empty: str) -> None:
     """One column a key; `empty` where there are no rows."""
     if not rows:
         console.print(empty)

@@ -24,8 +24,9 @@ def test_the_machine_is_described(tmp_path: Path) -> None:
 
 
 def test_a_table_for_people(capsys) -> None:
-    print_table("Pose", [{"category": "cup", "median_t": float("inf"), "acc30": 97.25}], ["category", "acc30", "median_t"])
+    print_table("Pose, [new]/data", [{"category": "cup [a]", "median_t": float("inf"), "acc30": 97.25}], ["category", "acc30", "median_t"])
     printed = capsys.readouterr().out
-    assert "cup" in printed
+    assert "cup [a]" in printed
+    assert "Pose, [new]/data" in printed
     assert "97.2" in printed
     assert "–" in printed

@@ -19,6 +19,7 @@ from typer.testing import CliRunner, Result
 import service.app
 from clients.cli import app
 from clients.cli.robot import _facts
+from clients.cli.terminal import console, errors, print_facts, print_table
 from clients.datasets import samples as shipped
 from clients.datasets.folders import Sequence
 from clients.errors import Unreachable
@@ -179,6 +180,16 @@ def test_brackets_of_an_error_are_printed(monkeypatch: pytest.MonkeyPatch) -> No
 
     monkeypatch.setattr("clients.datasets.sources.find_sequences", refuse)
     assert onelook("observe", "x").output == "error: views[3].depth: install 'onelook[server]'\n"
+
+
+def test_names_are_printed_as_they_are(capsys: pytest.CaptureFixture[str]) -> None:
+    name = "[mug] :car: [/b]"
+    print_table([{"name": name}], "none")
+    print_facts({"category": name})
+    console.print(f"forgot {name}")
+    errors.print(f"a key for {name}")
+    printed = capsys.readouterr()
+    assert (printed.out.count(name), printed.err.count(name)) == (3, 1)
 
 
 def test_an_uncertain_answer_says_where_to_look_next() -> None:
