@@ -163,11 +163,12 @@ def _category(connection: Connection, archive: zipfile.ZipFile, category: Catego
     for name, file in files.items():
         path = connection.root / "categories" / category.id / name
         if (wrong := problem(path, file)) is not None:
-            called = f"category {category.id} ({category.name})" if category.name else f"category {category.id}"
-            raise Unavailable(f"{called} is damaged: {name} {wrong}; restore it from a backup, or export the others by naming them")
+            raise _damaged(category, f"{name} {wrong}")
         archive.writestr(_info(f"categories/{category.id}/{name}"), path.read_bytes())
     instances = connection.rows("SELECT * FROM instances WHERE category_id = ? AND removed_by IS NULL ORDER BY rowid", category.id)
     instances = [instance for instance in instances if not damaged(instance)]
+    if not instances:
+        raise _damaged(category, "no burst of it has the tokens that were written")
     tokens = _tokens(instances)
     archive.writestr(_info(f"tokens/{category.id}.npz"), tokens)
     return CategoryEntry(
@@ -180,6 +181,11 @@ def _category(connection: Connection, archive: zipfile.ZipFile, category: Catego
         instances=[_instance(instance, category.id) for instance in instances],
         goals=[_goal(goal) for goal in connection.rows("SELECT * FROM goals WHERE category_id = ? ORDER BY rowid", category.id)],
     )
+
+
+def _damaged(category: Category, how: str) -> Unavailable:
+    called = f"category {category.id} ({category.name})" if category.name else f"category {category.id}"
+    return Unavailable(f"{called} is damaged: {how}; restore it from a backup, or export the others by naming them")
 
 
 def _tokens(instances: Sequence[Row]) -> bytes:

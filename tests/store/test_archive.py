@@ -99,6 +99,16 @@ def test_a_damaged_category_is_not_exported_but_the_others_are(learnt: Memory, c
     assert learnt.export(tmp_path / "all.zip", [other.id]).categories == 1
 
 
+def test_a_category_without_sound_tokens_is_not_exported_and_is_named(
+    learnt: Memory, category: Category, other: Category, tmp_path: Path
+) -> None:
+    with learnt._connection.change() as db:
+        db.execute("UPDATE instances SET cls = zeroblob(4) WHERE category_id = ?", [category.id])
+    with pytest.raises(Unavailable, match="cup.* damaged: no burst of it has the tokens that were written; restore it"):
+        learnt.export(tmp_path / "all.zip")
+    assert learnt.export(tmp_path / "all.zip", [other.id]).categories == 1
+
+
 def test_an_export_never_replaces_a_file_and_is_never_empty(learnt: Memory, second: Memory, archive: Path, tmp_path: Path) -> None:
     with pytest.raises(Conflict, match="exists"):
         learnt.export(archive)
