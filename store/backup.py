@@ -62,7 +62,7 @@ def back_up(connection: Connection, folder: Path, progress: Progress = untold) -
         sync(partial)
         partial.rename(folder)
         sync(folder.parent)
-    except OSError as error:
+    except (OSError, sqlite3.Error) as error:
         raise Unavailable(f"cannot back up to {folder}: {error}; free space, or choose another folder") from error
     finally:
         shutil.rmtree(partial, ignore_errors=True)  # there is none once it has its name

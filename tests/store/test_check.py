@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import resource
 from pathlib import Path
 
 import pytest
@@ -14,6 +15,9 @@ from core.views import Burst
 from store import backup as backups
 from store.memory import Memory
 from store.records import Category
+
+SMALL_BYTES = 40_000
+"""More than a memory that is only read writes beside itself, less than its rows are."""
 
 
 def flip(path: Path) -> None:
@@ -215,3 +219,15 @@ def test_a_backup_that_cannot_be_written_leaves_nothing(full: Memory, tmp_path: 
     with pytest.raises(Unavailable, match="choose another folder"):
         full.backup(tmp_path / "file" / "a")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["file", "memory"]
+
+
+def test_a_backup_on_a_full_disk_is_told_with_the_remedy_and_leaves_nothing(full: Memory, tmp_path: Path) -> None:
+    """SQLite's own report, not one made up for it."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (SMALL_BYTES, hard))
+    try:
+        with pytest.raises(Unavailable, match="^cannot back up to .*; free space, or choose another folder$"):
+            full.backup(tmp_path / "a")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert [path.name for path in tmp_path.iterdir()] == ["memory"]
