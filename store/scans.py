@@ -117,7 +117,7 @@ class Scans:
         over = self._connection.rows(f"SELECT id FROM scans WHERE {OPEN} AND expires_at <= ?", now())
         for row in over:
             with self._connection.change() as db:
-                db.execute("UPDATE scans SET state = 'expired' WHERE id = ?", [row["id"]])
+                db.execute(f"UPDATE scans SET state = 'expired' WHERE id = ? AND {OPEN}", [row["id"]])  # it may be completed by now
                 db.execute("DELETE FROM scan_bursts WHERE scan_id = ?", [row["id"]])
             self._connection.remove([self.folder(row["id"])])
 

@@ -14,6 +14,7 @@ from core.errors import Conflict, NotFound
 from core.reference import Reference
 from core.scan import ScanRequest
 from core.views import Burst
+from store.connection import before_change
 from store.memory import Memory
 from store.retention import Retention
 
@@ -107,6 +108,21 @@ def test_an_expired_scan_takes_no_more_views(folder: Path, request_for_views: Sc
         scan = memory.scans.create(request_for_views)
         with pytest.raises(Conflict, match="since no views came; begin another"):
             memory.scans.add(scan.id, burst)
+
+
+def test_a_scan_that_is_completed_while_others_expire_stays_completed(
+    folder: Path, request_for_views: ScanRequest, reference: Reference, burst: Burst, encoded: EncodedBurst
+) -> None:
+    with Memory.open(folder, Retention(scans=timedelta(0))) as memory:
+        scan = memory.scans.create(request_for_views)
+
+        def complete() -> None:
+            before_change.reset(token)
+            memory.categories.create(reference, burst, encoded, scan_id=scan.id)
+
+        token = before_change.set(complete)
+        memory.scans.expire()
+        assert memory.scans.get(scan.id).state == "completed"
 
 
 def test_scans_are_counted_by_state(memory: Memory, request_for_views: ScanRequest, burst: Burst) -> None:
