@@ -5,7 +5,7 @@ from __future__ import annotations
 from sqlite_utils import Database
 
 from core.encode import EncodedBurst
-from core.errors import Conflict
+from core.errors import Conflict, NotFound
 from core.reference import Reference
 from core.views import Burst
 from store.audit import record
@@ -28,7 +28,8 @@ class Corrections:
     def to_category(self, observation_id: str, category_id: str, encoded: EncodedBurst, *, actor: str | None = None) -> None:
         """It was of this category.
 
-        Raises Conflict where the category is gone, has the burst already, or where another one would be left without any.
+        Raises NotFound where the observation was dropped, Conflict where the category is gone, has the burst already, or where another one
+        would be left without any.
         """
         with self._connection.change(observation_id) as db:
             require_living(db, category_id)
@@ -44,7 +45,7 @@ class Corrections:
         name: str | None = None,
         actor: str | None = None,
     ) -> str:
-        """It was of no category so far: its views make one, whose id this returns. Raises Conflict as `to_category` does."""
+        """It was of no category so far: its views make one, whose id this returns. Raises as `to_category` does."""
         category_id = new_id()
 
         def insert(db: Database, files: Files) -> None:
@@ -57,7 +58,9 @@ class Corrections:
 
 
 def _correct(db: Database, observation_id: str, category_id: str, encoded: EncodedBurst, actor: str | None, *, made: bool) -> None:
-    (said,) = db.execute("SELECT corrected_to FROM observations WHERE id = ?", [observation_id]).fetchone()
+    seen = db.execute("SELECT corrected_to FROM observations WHERE id = ?", [observation_id]).fetchone()
+    if seen is None:
+        raise NotFound(f"observation {observation_id!r} was dropped meanwhile, as one of the oldest")
     assigned: Row | None = next(iter(db.query(ASSIGNED, [observation_id])), None)
     if assigned is None:
         instance_id = insert_instance(db, category_id, encoded, source="observation", source_id=observation_id, how="named")
@@ -70,7 +73,7 @@ def _correct(db: Database, observation_id: str, category_id: str, encoded: Encod
         if is_empty(db, assigned["category_id"]):
             raise Conflict(f"the burst is the last of category {assigned['category_id']!r}; merge or delete that category instead")
     db.execute("UPDATE observations SET corrected_to = ? WHERE id = ?", [category_id, observation_id])
-    before = {"assigned": assigned, "corrected_to": said}
+    before = {"assigned": assigned, "corrected_to": seen[0]}
     after = {"observation": observation_id, "category": category_id, "instance": instance_id, "made": made}
     record(db, "correct", category_id, before, after, actor)
 
@@ -94,5 +97,7 @@ def undo_correction(db: Database, entry: AuditEntry, undo_id: str) -> bool:
         into_bin = f"UPDATE categories SET removed_by = ? WHERE id = ? AND removed_by IS NULL AND {empty}"
         if not db.execute(into_bin, [undo_id, after["category"]]).rowcount:
             return False
+    elif is_empty(db, after["category"]):
+        return False
     db.execute("UPDATE observations SET corrected_to = ? WHERE id = ?", [before["corrected_to"], after["observation"]])
     return True

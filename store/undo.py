@@ -11,6 +11,7 @@ from store.audit import UNDOABLE, record
 from store.categories import move_instances
 from store.connection import Connection, new_id
 from store.corrections import undo_correction
+from store.instances import is_empty
 from store.records import Action, AuditEntry
 
 
@@ -54,8 +55,9 @@ def _forget(db: Database, entry: AuditEntry, undo_id: str) -> bool:
 
 def _merge(db: Database, entry: AuditEntry, undo_id: str) -> bool:
     assert entry.category_id is not None
-    back = move_instances(db, entry.before["instances"], entry.after["into"], entry.category_id)
-    return _delete(db, entry, undo_id) and back > 0
+    into = entry.after["into"]
+    back = move_instances(db, entry.before["instances"], into, entry.category_id)
+    return _delete(db, entry, undo_id) and back > 0 and not is_empty(db, into)
 
 
 def _split(db: Database, entry: AuditEntry, undo_id: str) -> bool:

@@ -84,6 +84,14 @@ def test_a_category_that_is_gone_gets_nothing(memory: Memory, other: Category, a
         memory.corrections.to_category(assigned.id, other.id, encoded)
 
 
+def test_an_observation_that_was_dropped_meanwhile_is_named(memory: Memory, category: Category, reference, burst, encoded) -> None:
+    with pytest.raises(NotFound, match="^observation 'gone' was dropped meanwhile, as one of the oldest$"):
+        memory.corrections.to_category("gone", category.id, encoded)
+    with pytest.raises(NotFound, match="^observation 'gone' was dropped meanwhile, as one of the oldest$"):
+        memory.corrections.to_new("gone", reference, burst, encoded)
+    assert [path.name for path in memory.categories.root.iterdir()] == [category.id]
+
+
 def test_the_trail_says_who_and_what(memory: Memory, category: Category, other: Category, assigned: Observation, encoded) -> None:
     before = assignment(memory, assigned)
     memory.corrections.to_category(assigned.id, other.id, encoded, actor="anna")
@@ -158,3 +166,13 @@ def test_a_category_that_others_joined_since_is_not_taken_back(memory: Memory, u
     with pytest.raises(Conflict, match="undo the later change first"):
         memory.undo(first.id)
     assert memory.categories.get(made).instances == 2
+
+
+def test_the_last_burst_of_a_category_is_not_taken_back_from_it(memory: Memory, category: Category, unassigned, encoded) -> None:
+    (own,) = memory.instances.of(category.id)
+    memory.corrections.to_category(unassigned.id, category.id, encoded)
+    corrected = last(memory)
+    memory.instances.forget(category.id, own.id)
+    with pytest.raises(Conflict, match="undo the later change first"):
+        memory.undo(corrected.id)
+    assert memory.categories.get(category.id).instances == 1

@@ -107,6 +107,19 @@ def test_a_merge_into_what_was_merged_on_is_undone_last(
     assert [each.instances for each in memory.categories.all()] == [1, 1, 1]
 
 
+def test_a_merge_whose_bursts_are_all_that_is_left_is_undone_last(memory: Memory, category: Category, other: Category) -> None:
+    (own,) = memory.instances.of(other.id)
+    memory.categories.merge(category.id, other.id)
+    merged = last(memory)
+    memory.instances.forget(other.id, own.id)
+    forgotten = last(memory)
+    with pytest.raises(Conflict, match="later change first"):
+        memory.undo(merged.id)
+    memory.undo(forgotten.id)
+    memory.undo(merged.id)
+    assert [each.instances for each in memory.categories.all()] == [1, 1]
+
+
 def test_an_unknown_change_is_refused(memory: Memory) -> None:
     with pytest.raises(NotFound):
         memory.undo("nope")
