@@ -55,3 +55,10 @@ def test_containers_have_as_little_as_they_can() -> None:
     with_memory = [name for name, service in COMPOSE["services"].items() if any("memory:" in each for each in service.get("volumes", []))]
     assert with_memory == ["owner"]
     assert "/docker/cluster/secrets/" in (DOCKER.parent / ".gitignore").read_text().splitlines()
+
+
+def test_the_page_makes_every_secret_that_the_containers_read() -> None:
+    page = (DOCKER.parent / "docs" / "scale.md").read_text()
+    made = [f"> docker/cluster/{secret['file'].removeprefix('./')}\n" for secret in COMPOSE["secrets"].values()]
+    assert made
+    assert all(each in page for each in made)
