@@ -37,7 +37,7 @@ $(READY): pyproject.toml constraints.txt
 	@if [ -z "$(PYTHON)" ]; then echo "OneLook needs Python 3.10 to 3.13, and none is on the PATH; install one, or name it: make PYTHON=/path/to/python3.12" >&2; exit 1; fi
 	@if ! $(BIN)/python -c '' 2>/dev/null; then echo "making $(VENV) with $(PYTHON)"; $(PYTHON) -m venv --clear $(VENV) || \
 		{ echo "Python's venv module is missing; on Debian and Ubuntu: sudo apt-get install python3-venv" >&2; rm -rf $(VENV); exit 1; }; fi
-	@echo "installing (the first time downloads a few hundred megabytes)"
+	@echo "installing (the first time downloads $(if $(TORCH_INDEX),a few hundred megabytes,several gigabytes where torch brings CUDA))"
 	@PYTHONWARNINGS=ignore $(BIN)/python -m pip install $$([ -t 2 ] || echo --quiet) --disable-pip-version-check --constraint constraints.txt $(if $(TORCH_INDEX),--extra-index-url $(TORCH_INDEX)) --editable '.[server,dev]'
 	@$(BIN)/python -c 'import open3d' 2>/dev/null || $(if $(filter 0,$(shell id -u)),$(INSTALL_LIBRARIES),false) && $(BIN)/python -c 'import open3d' || \
 		{ echo "Open3D needs system libraries; run: sudo apt-get install $(LIBRARIES)" >&2; exit 1; }

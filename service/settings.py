@@ -37,7 +37,7 @@ class Settings(BaseSettings):
     device: str = Field("cpu", description="Torch device of the backbone: `cpu`, `cuda`, `cuda:1`.")
     score: str = Field(DEFAULT_SCORE, description="How similar two bursts are, for the decision.")
     threshold: float | None = Field(
-        None, allow_inf_nan=False, description="Least similarity of a known object; the score's own default where left out."
+        None, allow_inf_nan=False, description="Least similarity of a known object; from the rate, or the score's own, where left out."
     )
     false_known_rate: float = Field(
         0.01,

@@ -57,7 +57,7 @@ class Finding:
 
 
 def doctor(json: Json = False) -> None:
-    """Check what the service needs: libraries, Open3D, weights, device, memory, port. Exits with 1 where it would not start."""
+    """Check what the service needs: libraries, Open3D, weights, device, memory, disk, port. Exits with 1 where it would not start."""
     findings = []
     with errors.status("looking") as status:
         for finding in examine():

@@ -46,7 +46,7 @@ def serve(
     data_dir: Annotated[Path | None, typer.Option(help="Folder of the memory; in the user's data folder where left out.")] = None,
     backbone: Annotated[str | None, typer.Option(help="Name of a backbone, dinov2-s14 where left out, or a folder.")] = None,
     device: Annotated[str | None, typer.Option(help="Torch device: cpu where left out, cuda, cuda:1.")] = None,
-    threshold: Annotated[float | None, typer.Option(help="Least similarity of a known object; the score's own where left out.")] = None,
+    threshold: Annotated[float | None, typer.Option(help="Least similarity of a known object; from the rate where left out.")] = None,
     cluster: Annotated[bool, typer.Option("--cluster", help="On Ray Serve: what computes is in processes of its own.")] = False,
 ) -> None:
     """Start the service. What has no option here is set by the variables below."""

@@ -90,7 +90,7 @@ MULTIPART: dict[str, Any] = {
             "rgb": _images | {"description": "Colour images, JPEG or PNG, one a view, in order."},
             "depth": _images
             | {"description": "z-depth aligned to rgb, 16-bit PNG in units of depth_scale, 0 = not measured; all or none."},
-            "mask": _images | {"description": "Silhouettes, PNG, not 0 = object; all or none. Left out, the object is found by attention."},
+            "mask": _images | {"description": "Silhouettes, PNG, not 0 = object; all or none. Left out, the object is found by itself."},
         },
     },
     "encoding": {"burst": {"contentType": "application/json"}},

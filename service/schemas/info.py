@@ -24,6 +24,6 @@ class Info(BaseModel):
     score: Score
     threshold: Threshold
     false_known_rate: FalseKnownRate
-    variant: str = Field(description="Variant of the pose pipeline, where a request names none.", examples=["ucd"])
+    variant: str = Field(description="Variant of the pose pipeline, where a request names none.", examples=["best"])
     categories: int = Field(description="In the memory.")
     memory_version: int = Field(description="Grows with each change of the memory.")
