@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from core.affine9 import Affine9, fit_affine9
+from core.boxes import cloud_extent_m
 from core.clock import StageClock
 from core.errors import NoPose
 from core.estimators.base import MAX_SCALE, Estimator, errors_m, root_mean_square
@@ -27,6 +28,8 @@ def by_retrieval(pair: MatchedPair, consensus_deg: float | None, threshold_m: fl
     pairs = pair.best_pairs()
     if not pairs:
         raise NoPose("no view of the target resembles any view of the reference; send more views")
+    if not cloud_extent_m(pair.surfaces[1].points_m):
+        raise NoPose("depth was measured at one point of the target, so its size is not determined; send more views or better depth")
     rotations = pair.rotations(pairs)
     if consensus_deg is not None:
         agree = near_their_mean(rotations, consensus_deg)
