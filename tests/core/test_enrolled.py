@@ -134,6 +134,17 @@ def test_a_large_memory_is_not_read_again(seen: Callable[[int, int], EncodedBurs
     assert len(kept.read) < ADAPTED_FROM
 
 
+def test_what_is_no_longer_kept_is_read_again(seen: Callable[[int, int], EncodedBurst], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("core.enrolled.KEPT", 4)
+    monkeypatch.setattr("core.enrolled.KEPT_COHORTS", 2)
+    kept = one_each(8)
+    enrolled = Enrolled(kept, WHITENING)
+    check_exact(kept, enrolled, seen(3, 9))
+    kept.read.clear()
+    check_exact(kept, enrolled, seen(5, 9))
+    assert kept.read
+
+
 def test_what_is_damaged_is_left_out_and_the_rest_goes_on(seen: Callable[[int, int], EncodedBurst]) -> None:
     for kinds in (10, 100):
         kept = one_each(kinds)

@@ -12,7 +12,7 @@ from core.errors import InvalidInput, NoPose
 from core.pose import PoseConfig, PoseEstimator, PoseOptions
 from core.sim3 import Sim3, rotation_angle_deg
 
-from .conftest import PaintedObject, blind, first_patches
+from .conftest import PaintedObject, blind, first_patches, turned
 
 
 @pytest.fixture
@@ -64,9 +64,16 @@ def test_two_views_from_one_place_do_not_tell_size(painted: PaintedObject, moved
         estimator.estimate(painted.reference(6), EncodedBurst((view, view), "painted"))
 
 
-def test_nothing_in_common_is_no_pose(painted: PaintedObject, estimator: PoseEstimator) -> None:
+def test_views_from_nearly_one_place_do_not_tell_size(painted: PaintedObject, estimator: PoseEstimator) -> None:
+    """A pose is found that both agree with, and would be of any size but for noise."""
+    here, beside = (blind(painted.encode(1, turned(angle_deg))).views[0] for angle_deg in (0, 3))
+    with pytest.raises(NoPose, match="those that agree are [23]° apart, at least 5° are needed"):
+        estimator.estimate(painted.reference(8), EncodedBurst((here, beside), "painted"))
+
+
+def test_too_few_patches_are_no_pose(painted: PaintedObject, estimator: PoseEstimator) -> None:
     few = first_patches(blind(painted.encode(3)), 2)
-    with pytest.raises(NoPose, match="patches of the target agree|several target views"):
+    with pytest.raises(NoPose, match="only 4 patches of the target agree"):
         estimator.estimate(painted.reference(4), few)
 
 

@@ -29,6 +29,8 @@ def depth(value: float) -> np.ndarray:
     [
         ({"rgb": np.zeros((64, 64), np.uint8)}, "view.rgb", "(H, W, 3)"),
         ({"rgb": np.zeros((64, 64, 3), np.uint16)}, "view.rgb", "uint8"),
+        ({"rgb": np.zeros((64, 31, 3), np.uint8)}, "view.rgb", "31×64 pixels; expected at least 32 a side"),
+        ({"rgb": np.zeros((4001, 4000, 3), np.uint8)}, "view.rgb", "at most 16 megapixels"),
         ({"depth_m": depth(800)}, "view.depth", "millimetres sent as metres"),
         ({"depth_m": depth(0.0008)}, "view.depth", "depth_scale"),
         ({"depth_m": depth(0)}, "view.depth", "zero everywhere"),
@@ -71,6 +73,11 @@ def test_a_bad_camera_is_refused(intrinsics: np.ndarray, pose: np.ndarray, words
 def test_intrinsics_of_another_resolution_are_refused() -> None:
     with pytest.raises(InvalidInput, match="scale K to this resolution"):
         view(camera=Camera(np.array([[600.0, 0, 320], [0, 600, 240], [0, 0, 1]]), np.eye(4)))
+
+
+def test_intrinsics_of_half_the_size_are_refused() -> None:
+    with pytest.raises(InvalidInput, match=r"^view\.K: its principal point \(16, 16\) is far from the centre of the 64×64 image"):
+        view(camera=Camera(np.array([[50.0, 0, 15.5], [0, 50.0, 15.5], [0, 0, 1]]), np.eye(4)))
 
 
 def test_an_empty_burst_is_refused() -> None:

@@ -12,7 +12,7 @@ from core.reference import Reference
 from core.sim3 import Sim3, rotation_angle_deg
 from core.warm import Settled, WarmConfig, follow, nearest_views, settle
 
-from .conftest import PaintedObject
+from .conftest import PaintedObject, blind
 
 CONFIG = WarmConfig()
 
@@ -52,6 +52,12 @@ def test_an_object_that_jumped_is_sought_anew(
 def test_another_object_is_not_followed(reference: Reference, painted: PaintedObject, moved: Sim3) -> None:
     before = settle(reference, painted.encode(4, moved), moved, CONFIG, seed=0)
     assert follow(reference, PaintedObject(seed=5).encode(4, moved), before, CONFIG, seed=0) is None
+
+
+def test_without_depth_there_is_nothing_to_follow(reference: Reference, painted: PaintedObject, moved: Sim3) -> None:
+    target = blind(painted.encode(3, moved))
+    assert settle(reference, target, moved, CONFIG, seed=0) is None
+    assert follow(reference, target, Settled(moved, 0.5), CONFIG, seed=0) is None
 
 
 def test_only_reference_views_from_about_there_are_looked_at(painted: PaintedObject, reference: Reference, moved: Sim3) -> None:
