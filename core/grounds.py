@@ -28,7 +28,7 @@ class Grounds:
     with_depth: int
     """Of these, how many have depth on it."""
     spread_deg: float | None
-    """Largest angle about the object between two of them; None without cameras and depth."""
+    """Largest angle about the object between two of them; None where cameras or depth are missing."""
     faults: tuple[tuple[ViewFault, ...], ...]
     """Of each view."""
 

@@ -70,10 +70,6 @@ class Nearness:
         cosines = (asked @ stacked.T - (asked @ self._centre)[:, None]) / self._lengths
         return [(self._nearest_members(row, count), self._founders_near(row, count)) for row in cosines]
 
-    def vectors(self, places: Sequence[int]) -> FloatArray:
-        """Mean pooled tokens of some members, shape (Q, D)."""
-        return self._vectors[np.asarray(places, dtype=np.intp)]
-
     def _nearest_members(self, cosines: FloatArray, count: int) -> list[int]:
         if count >= len(cosines):
             return np.argsort(-cosines, kind="stable").tolist()

@@ -49,7 +49,7 @@ def rearrange(
         box: the reference's, in the world frame of its scan.
         symmetries: rotations about the box's centre that map the reference onto itself, shape (S, 3, 3).
         goal_from_reference, current_from_reference: into one world frame.
-        up: away from the support at the goal, shape (3,), for the anchor `base`.
+        up: away from the support at the goal, unit vector, shape (3,), for the anchor `base`.
 
     Raises InvalidInput where `base` has no `up`.
     """

@@ -51,7 +51,7 @@ class ScanRequest:
     up_from: UpSource = "given"
     """Whether `up` was given, told from the cameras' orientations, or assumed since they do not tell it."""
     excluded: FloatArray = field(default_factory=lambda: np.empty((0, 4, 4)))
-    """Viewpoints that the robot cannot reach, shape (e, 4, 4); none of the others is near one."""
+    """Viewpoints that the robot cannot reach, shape (e, 4, 4); what replaces them is near none of them."""
 
 
 @dataclass(frozen=True)
@@ -154,7 +154,7 @@ def coverage(request: ScanRequest, world_from_camera: Sequence[FloatArray]) -> C
     viewpoints = tuple(index if angle <= REACH_DEG else None for index, angle in near)
     taken = np.array([pose[:3, 3] for pose in world_from_camera]).reshape(-1, 3)
     covered = np.any(angles_about_deg(request.world_from_camera[:, :3, 3], taken, request.center_m) <= REACH_DEG, axis=1)
-    return Coverage(viewpoints, tuple(angle for _, angle in near), tuple(map(bool, np.atleast_1d(covered))))
+    return Coverage(viewpoints, tuple(angle for _, angle in near), tuple(map(bool, covered)))
 
 
 def unit_up(up: Sequence[float]) -> FloatArray:

@@ -26,7 +26,7 @@ class TrackConfig:
     jump_extent: float = 0.5
     """The same for a move, as a share of the object's diameter."""
     believe_after: int = 3
-    """Frames in a row that must agree on a jump before it is believed: the object was really moved, or the first pose was wrong."""
+    """Poses in a row that must agree on a jump before it is believed: the object was really moved, or the first pose was wrong."""
     lose_after: int = 3
     """Frames in a row without a pose after which the object counts as lost."""
 
@@ -42,6 +42,7 @@ class Track:
     jumped: Sim3 | None = None
     """A pose far from `pose` that waits to be believed."""
     jumps: int = 0
+    """Poses in a row that agree with it, itself among them; frames without a pose say nothing."""
     misses: int = 0
     """Frames in a row without a pose."""
 
