@@ -27,7 +27,19 @@ from clients.calls import curating, observing, operating, rearranging, scanning
 from clients.calls.call import Call
 from clients.events import PATH as EVENTS
 from clients.events import Event, EventReader
-from clients.exchange import Retry, Wait, authorization, broken, connection_to, endless, exchange, key_header, problem_of
+from clients.exchange import (
+    Retry,
+    Wait,
+    address,
+    authorization,
+    broken,
+    connection_to,
+    endless,
+    exchange,
+    is_answer,
+    key_header,
+    problem_of,
+)
 from clients.robot import CONNECT_TIMEOUT_S, DEFAULT_URL, TIMEOUT_S, timeouts, with_self
 from clients.tracking import MAX_MESSAGE_BYTES, Conversation, Tracked, websocket_url
 from core.views import Burst, View
@@ -109,8 +121,10 @@ class AsyncRobotClient:
         """`api_key` is what `onelook keys create` told; the variable ONELOOK_API_KEY where it is left out.
 
         `http` replaces the connection (a test client, another transport); the others but `retry` are then its own.
+
+        Raises InvalidInput where `url` is no address.
         """
-        self._http = http or httpx.AsyncClient(base_url=url, timeout=timeouts(timeout_s), headers=key_header(api_key))
+        self._http = http or httpx.AsyncClient(base_url=address(url), timeout=timeouts(timeout_s), headers=key_header(api_key))
         self._retry = retry or Retry()
 
     async def __aenter__(self) -> AsyncRobotClient:
@@ -181,7 +195,7 @@ class AsyncRobotClient:
         params = {} if after is None else {"after": after}
         try:
             async with self._http.stream("GET", EVENTS, params=params, timeout=endless(self._http.timeout)) as response:
-                if response.is_error:
+                if not is_answer(response):
                     await response.aread()
                     raise problem_of(response)
                 async for line in response.aiter_lines():

@@ -24,6 +24,7 @@ from websockets.exceptions import InvalidStatus, WebSocketException
 
 from clients.calls.call import Call
 from clients.errors import ServiceProblem, TooSlow, Unreachable, problem_from_json
+from core.errors import InvalidInput
 
 T = TypeVar("T")
 KEY = "Idempotency-Key"
@@ -69,7 +70,7 @@ def exchange(call: Call[T], retry: Retry, url: str) -> Exchange[T]:
     for attempt in range(1, retry.attempts + 1):
         came = yield call
         assert came is not None
-        if isinstance(came, httpx.Response) and not came.is_error:
+        if isinstance(came, httpx.Response) and is_answer(came):
             return call.read(came)
         if attempt > 1 and call.method == "DELETE" and isinstance(came, httpx.Response) and came.status_code == 404:
             return call.read(came)  # the first attempt deleted it, and its answer was lost
@@ -78,6 +79,11 @@ def exchange(call: Call[T], retry: Retry, url: str) -> Exchange[T]:
             raise _failure(came, call, url) from (came if isinstance(came, Exception) else None)
         yield Wait(wait_s)
     raise AssertionError("a retry has at least one attempt")
+
+
+def is_answer(response: httpx.Response) -> bool:
+    """Whether the service has done what it was asked for. A page or a redirection is another server's, whatever its status says."""
+    return response.is_success and not response.headers.get("content-type", "").startswith("text/html")
 
 
 def _with_key(call: Call[T], key: str) -> Call[T]:
@@ -130,6 +136,17 @@ def broken(why: Exception, url: str) -> Unreachable:
     return Unreachable(f"the connection to {url} broke ({why}); look at the service's log")
 
 
+def address(url: str) -> str:
+    """The address itself. Raises InvalidInput where no service can be at it."""
+    try:
+        parsed = httpx.URL(url)
+    except httpx.InvalidURL:
+        parsed = httpx.URL()
+    if parsed.scheme not in {"http", "https"} or not parsed.host:
+        raise InvalidInput("url", f"expected an address such as http://127.0.0.1:8000 or http://[::1]:8000, found {url!r}")
+    return url
+
+
 def key_header(api_key: str | None) -> dict[str, str]:
     """The header that a key travels in; the environment's key where None is given, no header where it has none either."""
     key = os.environ.get(KEY_VARIABLE) if api_key is None else api_key
@@ -161,7 +178,7 @@ def endless(timeout: httpx.Timeout) -> httpx.Timeout:
 
 
 def problem_of(response: httpx.Response) -> ServiceProblem:
-    """The exception for an answer that is an error."""
+    """The exception for an answer that is none (`is_answer`)."""
     if response.headers.get("content-type", "").startswith(PROBLEM):
         return problem_from_json(response.status_code, response.json(), retry_after_s(response.headers))
     found = f"{response.url} answered {response.status_code} {response.reason_phrase}"

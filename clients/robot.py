@@ -30,7 +30,19 @@ from clients.calls import curating, observing, operating, rearranging, scanning
 from clients.calls.call import Call
 from clients.events import PATH as EVENTS
 from clients.events import Event, EventReader
-from clients.exchange import Retry, Wait, authorization, broken, connection_to, endless, exchange, key_header, problem_of
+from clients.exchange import (
+    Retry,
+    Wait,
+    address,
+    authorization,
+    broken,
+    connection_to,
+    endless,
+    exchange,
+    is_answer,
+    key_header,
+    problem_of,
+)
 from clients.tracking import MAX_MESSAGE_BYTES, Conversation, Tracked, websocket_url
 from core.views import Burst, View
 
@@ -124,8 +136,10 @@ class RobotClient:
         """`api_key` is what `onelook keys create` told; the variable ONELOOK_API_KEY where it is left out.
 
         `http` replaces the connection (a test client, another transport); the others but `retry` are then its own.
+
+        Raises InvalidInput where `url` is no address.
         """
-        self._http = http or httpx.Client(base_url=url, timeout=timeouts(timeout_s), headers=key_header(api_key))
+        self._http = http or httpx.Client(base_url=address(url), timeout=timeouts(timeout_s), headers=key_header(api_key))
         self._retry = retry or Retry()
 
     def __enter__(self) -> RobotClient:
@@ -199,7 +213,7 @@ class RobotClient:
         params = {} if after is None else {"after": after}
         try:
             with self._http.stream("GET", EVENTS, params=params, timeout=endless(self._http.timeout)) as response:
-                if response.is_error:
+                if not is_answer(response):
                     response.read()
                     raise problem_of(response)
                 for line in response.iter_lines():

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import shutil
-import socket
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
@@ -16,7 +15,7 @@ from typing import TYPE_CHECKING
 import typer
 from rich.text import Text
 
-from clients.cli.service import read_settings
+from clients.cli.service import bound, read_settings, url_of
 from clients.cli.terminal import Json, console, errors, print_json, print_table
 from clients.errors import ClientError
 from core.errors import OneLookError
@@ -121,10 +120,15 @@ def working_memory() -> Finding:
 
 def libraries() -> Finding:
     """Those of the service but Open3D."""
-    missing = [name for name in LIBRARIES if _why_not(name)]
-    if not missing:
+    reasons = {name: why for name in LIBRARIES if (why := _why_not(name))}
+    if not reasons:
         return Finding("libraries", State.good, f"torch {import_module('torch').__version__}")
-    return Finding("libraries", State.bad, f"{', '.join(missing)} missing", "run: pip install 'onelook[server]'")
+    missing = [name for name, why in reasons.items() if isinstance(why, ModuleNotFoundError)]
+    if missing:
+        return Finding("libraries", State.bad, f"{', '.join(missing)} missing", "run: pip install 'onelook[server]'")
+    name, why = next(iter(reasons.items()))
+    remedy = "install what it names with the system's packages, or run: pip install --force-reinstall 'onelook[server]'"
+    return Finding("libraries", State.bad, f"{name} does not load: {why}", remedy)
 
 
 def open3d() -> Finding:
@@ -209,21 +213,18 @@ def port(settings: Settings) -> Finding:
     from clients.exchange import Retry
     from clients.robot import RobotClient
 
-    address = f"{settings.host}:{settings.port}"
-    with socket.socket() as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind((settings.host, settings.port))
-        except OSError as error:
-            refused = error.strerror
-        else:
-            return Finding("port", State.good, f"{address} is free")
+    url = url_of(settings.host, settings.port)
     try:
-        with RobotClient(f"http://{address}", timeout_s=PROBE_S, retry=Retry(attempts=1)) as robot:
-            return Finding("port", State.good, f"{address}: OneLook {robot.info().version} answers")
+        with bound(settings.host, settings.port):
+            return Finding("port", State.good, f"{url} is free")
+    except OSError as error:
+        refused = error.strerror
+    try:
+        with RobotClient(url, timeout_s=PROBE_S, retry=Retry(attempts=1)) as robot:
+            return Finding("port", State.good, f"{url}: OneLook {robot.info().version} answers")
     except ClientError:
         remedy = "stop what uses it, or choose another one with ONELOOK_PORT or --port (0 takes a free one)"
-        return Finding("port", State.bad, f"{address}: {refused}", remedy)
+        return Finding("port", State.bad, f"{url}: {refused}", remedy)
 
 
 def _why_not(library: str) -> Exception | None:

@@ -63,10 +63,11 @@ def _serve_here(settings: Settings) -> None:
     from service.app import checked_backbone, create_app
     from service.server import Server
 
-    with _bound(settings.host, settings.port) as listener:
+    with _listener(settings) as listener:
         # Opened once before uvicorn starts, which would wrap the sentence that says what is wrong in a traceback.
         app = create_app(settings, backbone=checked_backbone(settings))
-        log.info("serving on http://%s:%d, memory in %s; Ctrl+C stops it", settings.host, listener.getsockname()[1], settings.data_dir)
+        url = url_of(settings.host, listener.getsockname()[1])
+        log.info("serving on %s, memory in %s; Ctrl+C stops it", url, settings.data_dir)
         with contextlib.suppress(KeyboardInterrupt):
             Server(app).run(sockets=[listener])
 
@@ -76,7 +77,7 @@ def _serve_cluster(settings: Settings) -> None:
         from service.cluster.running import run
     except ModuleNotFoundError as error:
         raise Unavailable(f"--cluster needs {error.name}; install it with: pip install 'onelook[server,cluster]'") from error
-    with _bound(settings.host, settings.port) as listener:
+    with _listener(settings) as listener:
         port = listener.getsockname()[1]  # Ray Serve binds it itself
     run(settings.model_copy(update={"port": port}))
 
@@ -96,14 +97,27 @@ def read_settings(given: dict[str, object]) -> Settings:
         raise InvalidInput(field, f"{first['msg']}, found {first['input']!r}") from error
 
 
-def _bound(host: str, port: int) -> socket.socket:
-    """A socket that has the port but does not listen yet: nobody connects before the service can answer. Raises Unavailable."""
+def bound(host: str, port: int) -> socket.socket:
+    """A socket that has the port but does not listen yet: nobody connects before the service can answer. Raises OSError."""
     listener = socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET)
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         listener.bind((host, port))
-    except OSError as error:
+    except OSError:
         listener.close()
-        remedy = "stop what uses it, or choose another one with --port (0 takes a free one) or --host"
-        raise Unavailable(f"cannot listen on {host}, port {port} ({error.strerror}); {remedy}") from error
+        raise
     return listener
+
+
+def _listener(settings: Settings) -> socket.socket:
+    """The service's own. Raises Unavailable."""
+    try:
+        return bound(settings.host, settings.port)
+    except OSError as error:
+        remedy = "stop what uses it, or choose another one with --port (0 takes a free one) or --host"
+        raise Unavailable(f"cannot listen on {settings.host}, port {settings.port} ({error.strerror}); {remedy}") from error
+
+
+def url_of(host: str, port: int) -> str:
+    """Where the service is asked."""
+    return f"http://[{host}]:{port}" if ":" in host else f"http://{host}:{port}"

@@ -74,6 +74,13 @@ def test_missing_libraries_stop_the_search_with_the_line_to_run(monkeypatch: pyt
     assert "port" not in findings()
 
 
+def test_a_library_that_is_there_but_does_not_load_is_not_called_missing(monkeypatch: pytest.MonkeyPatch) -> None:
+    why = ImportError("libcudart.so.12: cannot open shared object file")
+    monkeypatch.setattr(doctor, "_why_not", lambda library: why if library == "torch" else None)
+    found = doctor.libraries()
+    assert (found.state, found.found) == (State.bad, f"torch does not load: {why}")
+
+
 def test_open3d_without_its_system_libraries(monkeypatch: pytest.MonkeyPatch) -> None:
     why = OSError("libGL.so.1: cannot open shared object file")
     monkeypatch.setattr(doctor, "_why_not", lambda library: why if library == "open3d" else None)
@@ -132,6 +139,16 @@ def test_a_used_port(monkeypatch: pytest.MonkeyPatch) -> None:
         found = doctor.port(Settings())
     assert found.state is State.bad
     assert "--port" in (found.remedy or "")
+
+
+def test_an_address_of_ipv6_may_be_taken_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    def taken(host: str, port: int) -> socket.socket:
+        raise OSError(98, "Address already in use")
+
+    monkeypatch.setattr(doctor, "PROBE_S", 0.1)
+    monkeypatch.setattr(doctor, "bound", taken)  # not every machine that tests run on has an address of IPv6
+    found = doctor.port(Settings(host="::1", port=9))
+    assert (found.state, found.found) == (State.bad, "http://[::1]:9: Address already in use")
 
 
 def test_the_service_itself_on_its_port(url: str) -> None:

@@ -11,6 +11,7 @@ import pytest
 
 from clients import errors
 from clients.answers.categories import Category
+from clients.asynchronous import AsyncRobotClient
 from clients.datasets.folders import Sequence, load_burst
 from clients.exchange import Retry
 from clients.robot import RobotClient
@@ -145,6 +146,27 @@ def test_another_server_is_told_from_the_service() -> None:
     robot = answering(httpx.MockTransport(lambda request: httpx.Response(502, text="<html>Bad Gateway</html>")))
     with pytest.raises(errors.ServiceProblem, match="502 Bad Gateway, which is no answer of this service"):
         robot.info()
+
+
+@pytest.mark.parametrize(
+    ("answer", "said"),
+    [
+        (httpx.Response(200, html="<html>somebody's page</html>"), "200 OK"),
+        (httpx.Response(302, headers={"location": "/login"}), "302 Found"),
+    ],
+)
+def test_a_page_or_a_redirection_is_no_answer(answer: httpx.Response, said: str) -> None:
+    robot = answering(httpx.MockTransport(lambda request: answer))
+    for ask in (robot.categories, lambda: robot.cloud("c"), lambda: next(robot.events())):
+        with pytest.raises(errors.ServiceProblem, match=f"{said}, which is no answer of this service"):
+            ask()
+
+
+@pytest.mark.parametrize("url", ["127.0.0.1:8000", "localhost:8000", "http://robot:port", "http://::1:8000", "ftp://robot", "http://", ""])
+@pytest.mark.parametrize("client", [RobotClient, AsyncRobotClient])
+def test_what_is_no_address_is_said_at_once(client: type, url: str) -> None:
+    with pytest.raises(InvalidInput, match=r"^url: expected an address such as http://127\.0\.0\.1:8000 .*found '"):
+        client(url)
 
 
 @pytest.mark.parametrize(

@@ -19,6 +19,7 @@ from typer.testing import CliRunner, Result
 import service.app
 import service.settings
 from clients.cli import app
+from clients.cli.service import bound
 from core.errors import Unavailable
 from store.memory import Memory
 
@@ -70,6 +71,11 @@ def test_it_says_where_it_serves(serve: Callable[..., Result], tmp_path: Path) -
     assert started.exit_code == 0, started.output
     assert "serving on http://127.0.0.1:" in started.stderr
     assert str(tmp_path / "memory") in started.stderr
+
+
+def test_an_address_of_ipv6_is_in_brackets(serve: Callable[..., Result], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("clients.cli.service.bound", lambda host, port: bound("127.0.0.1", port))  # which every machine has
+    assert "serving on http://[::1]:" in serve("--host", "::1").stderr
 
 
 def test_it_listens_only_once_it_is_warm(serve: Callable[..., Result], monkeypatch: pytest.MonkeyPatch) -> None:
