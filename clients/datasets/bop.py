@@ -9,7 +9,6 @@ Where a scene's cameras have no pose, the object's own frame is the world: the o
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -66,18 +65,18 @@ class BopReader(folders.Reader):
 
     def _view(self, scene: Path, sight: Sight, cameras: Mapping[str, Any], truth: Mapping[str, Any], masks: bool) -> View:
         depth_file, mask_file, entry = _depth_file(scene, sight), _mask_file(scene, sight), cameras[sight.key]
-        depth_m = None
+        within, depth_m = f"{scene / CAMERAS}: {sight.key}.", None
         if depth_file.exists():
-            depth_m = read_depth(depth_file, entry["depth_scale"] / 1000)
+            depth_m = read_depth(depth_file, float(folders.read_numbers(entry, "depth_scale", (), within)) / 1000)
         mask = read_mask(mask_file) if (masks or not sight.alone) and mask_file.exists() else None
-        within = f"{scene / CAMERAS}: {sight.key}."
-        return View(read_rgb(sight.image), depth_m, _camera(entry, truth[sight.key][sight.index], within), mask)
+        camera_from_model = _camera_from_model(scene, sight, truth)
+        return View(read_rgb(sight.image), depth_m, _camera(entry, camera_from_model, within), mask)
 
 
 def find_sequences(root: Path) -> list[folders.Sequence]:
     """Every annotated object of every scene below `root`. Raises InvalidInput where there is none."""
     models = _models(root)
-    scenes = sorted({Path(folder) for folder, _, files in os.walk(root, followlinks=True) if TRUTH in files and CAMERAS in files})
+    scenes = sorted(folder for folder, files in folders.folders_below(root) if TRUTH in files and CAMERAS in files)
     sequences = [each for scene in scenes for each in _scene(scene, root, models)]
     if not sequences:
         raise InvalidInput("data", f"no object is annotated below {root}; expected SPLIT/SCENE/{TRUTH} with {CAMERAS} and rgb/ or gray/")
@@ -106,29 +105,30 @@ def _sequence(scene: Path, instance: str, number: int, sights: list[Sight], mode
     model = models.get(str(number))
     world_from_model, longest = None, None
     if model:
-        first = truth[sights[0].key][sights[0].index]
+        camera_from_model = _camera_from_model(scene, sights[0], truth)
         sides = np.array([model["size_x"], model["size_y"], model["size_z"]]) / 1000
         centre = np.array([model["min_x"], model["min_y"], model["min_z"]]) / 1000 + sides / 2
         frame = Sim3(float(np.linalg.norm(sides)), np.eye(3), centre)
         within = f"{scene / CAMERAS}: {sights[0].key}."
-        pose = _camera(cameras[sights[0].key], first, within).world_from_camera @ _camera_from_model(first)
+        pose = _camera(cameras[sights[0].key], camera_from_model, within).world_from_camera @ camera_from_model
         world_from_model, longest = Sim3.from_matrix(pose) @ frame, float(sides.max())
     images = tuple(sight.image for sight in sights)
     symmetries = _symmetries(model or {}, f"models_info.json: {number}")
     return folders.Sequence(scene, f"{number:06}", instance, images, world_from_model, symmetries, BopReader(tuple(sights)), longest)
 
 
-def _camera(entry: Mapping[str, Any], truth: Mapping[str, Any], within: str) -> Camera:
+def _camera(entry: Mapping[str, Any], camera_from_model: FloatArray, within: str) -> Camera:
     if "cam_R_w2c" in entry:
         return folders.read_camera(entry, within)
-    return Camera(folders.read_numbers(entry, "cam_K", (3, 3), within), np.linalg.inv(_camera_from_model(truth)))
+    return Camera(folders.read_numbers(entry, "cam_K", (3, 3), within), np.linalg.inv(camera_from_model))
 
 
-def _camera_from_model(truth: Mapping[str, Any]) -> FloatArray:
+def _camera_from_model(scene: Path, sight: Sight, truth: Mapping[str, Any]) -> FloatArray:
     """Rigid, shape (4, 4), metres."""
+    entry, within = truth[sight.key][sight.index], f"{scene / TRUTH}: {sight.key}[{sight.index}]."
     pose = np.eye(4)
-    pose[:3, :3] = np.array(truth["cam_R_m2c"], dtype=float).reshape(3, 3)
-    pose[:3, 3] = np.array(truth["cam_t_m2c"], dtype=float) / 1000
+    pose[:3, :3] = folders.read_numbers(entry, "cam_R_m2c", (3, 3), within)
+    pose[:3, 3] = folders.read_numbers(entry, "cam_t_m2c", (3,), within) / 1000
     return pose
 
 

@@ -79,7 +79,10 @@ class Co3dReader(folders.Reader):
     def files(self, sequence: folders.Sequence) -> list[Path]:
         """See `folders.Reader`."""
         depths = [frame.depth for frame in self.frames if frame.depth]
-        return [self.root / name for name in [*(frame.image for frame in self.frames), *(str(depth["path"]) for depth in depths)]]
+        consistent = [depth["mask_path"] for depth in depths if depth.get("mask_path")]
+        return [
+            self.root / str(name) for name in [*(frame.image for frame in self.frames), *(each["path"] for each in depths), *consistent]
+        ]
 
     def cameras(self, sequence: folders.Sequence) -> str:
         """See `folders.Reader`: the annotations of a whole category are one file."""

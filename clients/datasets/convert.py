@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from clients.datasets.folders import ABOUT, Sequence, load_burst
+from clients.datasets.folders import ABOUT, CAMERAS, TRUTH, Sequence, load_burst
 from clients.datasets.images import write_image
 from core.errors import InvalidInput
 from core.sim3 import Sim3
@@ -61,7 +61,7 @@ def _write_sequence(sequence: Sequence, folder: Path) -> None:
     if sequence.longest_side_m is not None:
         about["longest_side_mm"] = 1000 * sequence.longest_side_m
     about["symmetries"] = [_row(symmetry) for symmetry in sequence.symmetries]
-    for name, content in (("scene_camera.json", cameras), ("scene_gt.json", truth)):
+    for name, content in ((CAMERAS, cameras), (TRUTH, truth)):
         if content:
             (folder / name).write_text(json.dumps(content))
     # Last: it makes the folder a sequence, so that half of one is never taken for a whole.

@@ -93,7 +93,7 @@ Format = Callable[[Path], list[Sequence]]
 
 def find_sequences(root: Path) -> list[Sequence]:
     """Every sequence below `root`, links followed, sorted by path. Raises InvalidInput where there is none."""
-    folders = sorted(_sequence_folders(root))
+    folders = sorted(folder for folder, files in folders_below(root) if ABOUT in files)
     if not folders:
         other = f"or another layout by its prefix, such as transforms:{root}"
         raise InvalidInput("data", f"no {ABOUT} below {root}; expected CATEGORY/INSTANCE/{ABOUT}, {other}")
@@ -114,8 +114,8 @@ def load_burst(sequence: Sequence, indices: Indices[int] | None = None, *, masks
     return Burst(sequence.reader.read(sequence, chosen, masks))
 
 
-def _sequence_folders(root: Path) -> Iterator[Path]:
-    """Each folder once, however many links lead to it: one may even lead back up."""
+def folders_below(root: Path) -> Iterator[tuple[Path, list[str]]]:
+    """`root` and every folder below it with the names of its files; each once, however many links lead to it: one may even lead back up."""
     seen: set[Path] = set()
     for folder, inner, files in os.walk(root, followlinks=True):
         inner.sort()
@@ -124,8 +124,7 @@ def _sequence_folders(root: Path) -> Iterator[Path]:
             inner.clear()
             continue
         seen.add(resolved)
-        if ABOUT in files:
-            yield Path(folder)
+        yield Path(folder), files
 
 
 def _load_view(sequence: Sequence, image: Path, cameras: dict[str, Any], masks: bool) -> View:
@@ -180,7 +179,7 @@ def _read_sequence(folder: Path) -> Sequence:
     images = tuple(sorted(path for path in (folder / "rgb").iterdir() if is_image(path)))
     listed = enumerate(about.get("symmetries") or ())
     symmetries = tuple(read_symmetry(matrix, f"{folder / ABOUT}: symmetries[{index}]") for index, matrix in listed)
-    longest_mm = about.get("longest_side_mm")
+    longest_mm = read_numbers(about, "longest_side_mm", (), f"{folder / ABOUT}: ") if about.get("longest_side_mm") else None
     return Sequence(
         folder,
         about["category"],
@@ -188,7 +187,7 @@ def _read_sequence(folder: Path) -> Sequence:
         images,
         _world_from_model(folder, about),
         symmetries,
-        longest_side_m=longest_mm / 1000 if longest_mm else None,
+        longest_side_m=None if longest_mm is None else float(longest_mm) / 1000,
     )
 
 

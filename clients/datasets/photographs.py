@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -27,8 +26,8 @@ class PhotographReader(folders.Reader):
 def find_sequences(root: Path) -> list[folders.Sequence]:
     """Every folder that holds images, `root` or below it: its category is the folder around it. Raises InvalidInput where there is none."""
     found = []
-    for name, _, files in sorted(os.walk(root, followlinks=True)):
-        folder = Path(name).resolve()
+    for place, files in sorted(folders.folders_below(root)):
+        folder = place.resolve()
         images = tuple(folder / file for file in sorted(files) if is_image(Path(file)))
         if images:
             found.append(folders.Sequence(folder, folder.parent.name, folder.name, images, None, (), PhotographReader()))

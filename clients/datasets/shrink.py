@@ -12,7 +12,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from clients.datasets.folders import Sequence, by_category, find_sequences, load_burst
+from clients.datasets.folders import ABOUT, CAMERAS, TRUTH, Sequence, by_category, find_sequences, load_burst, read_json
 from clients.datasets.images import write_image
 from clients.datasets.viewpoints import spread
 from core.errors import InvalidInput
@@ -65,7 +65,7 @@ def draw(sequences: list[Sequence], config: ShrinkConfig, order: random.Random) 
 def _shrink_sequence(sequence: Sequence, out: Path, config: ShrinkConfig) -> None:
     burst = load_burst(sequence, masks=True)
     kept = spread(burst.cameras, config.views)
-    cameras, truth = (json.loads((sequence.path / name).read_text()) for name in ("scene_camera.json", "scene_gt.json"))
+    cameras, truth = (read_json(sequence.path / name) for name in (CAMERAS, TRUTH))
     depth_step_mm = _depth_step_mm([burst.views[index] for index in kept], config)
     small_cameras: dict[str, Any] = {}
     small_truth: dict[str, Any] = {}
@@ -74,15 +74,18 @@ def _shrink_sequence(sequence: Sequence, out: Path, config: ShrinkConfig) -> Non
         scale = config.side / max(view.size)
         _write_view(view, scale, out, new, config, depth_step_mm)
         small_cameras[str(new)] = cameras[key] | {"cam_K": _scaled_intrinsics(cameras[key]["cam_K"], scale), "depth_scale": depth_step_mm}
-        small_truth[str(new)] = truth[key]
-    (out / "scene_camera.json").write_text(json.dumps(small_cameras))
-    (out / "scene_gt.json").write_text(json.dumps(small_truth))
-    shutil.copyfile(sequence.path / "sequence.json", out / "sequence.json")
+        if key in truth:
+            small_truth[str(new)] = truth[key]
+    (out / CAMERAS).write_text(json.dumps(small_cameras))
+    if small_truth:
+        (out / TRUTH).write_text(json.dumps(small_truth))
+    shutil.copyfile(sequence.path / ABOUT, out / ABOUT)
 
 
 def _depth_step_mm(views: list[View], config: ShrinkConfig) -> float:
-    measured = np.concatenate([view.depth_m[view.depth_m > 0] for view in views if view.depth_m is not None])
-    return float(round(config.depth_step * float(np.median(measured)) * 1000, 3))
+    """Millimetres a unit; 1 where there is no depth."""
+    measured = [view.depth_m[view.depth_m > 0] for view in views if view.depth_m is not None]
+    return round(config.depth_step * float(np.median(np.concatenate(measured))) * 1000, 3) if measured else 1.0
 
 
 def _scaled_intrinsics(intrinsics: list[float], scale: float) -> list[float]:

@@ -41,33 +41,40 @@ class TransformsReader(folders.Reader):
         """See `folders.Reader`."""
         scene = folders.read_json(self.file)
         frames = _frames(scene, self.file)
-        return [_view(sequence.path, sequence.images[index], {**scene, **frames[index]}, masks, self.file) for index in indices]
+        chosen = [(sequence.images[index], *frames[index]) for index in indices]
+        return [_view(sequence.path, image, {**scene, **frame}, masks, within) for image, within, frame in chosen]
 
     def files(self, sequence: folders.Sequence) -> list[Path]:
         """See `folders.Reader`."""
-        depths = [_depth_name(frame) for frame in _frames(folders.read_json(self.file), self.file)]
+        depths = [_depth_name(frame) for _, frame in _frames(folders.read_json(self.file), self.file)]
         return [*sequence.images, *(sequence.path / name for name in depths if name), self.file]
 
 
 def find_sequences(root: Path) -> list[folders.Sequence]:
     """Every folder with such a file, `root` or below it. Raises InvalidInput where there is none."""
-    files = {path.parent: path for name in reversed(FILES) for path in root.rglob(name)}
-    if not files:
+    found = [(folder, [name for name in FILES if name in files]) for folder, files in sorted(folders.folders_below(root))]
+    sequences = [_sequence(folder.resolve(), (folder / names[0]).resolve()) for folder, names in found if names]
+    if not sequences:
         raise InvalidInput("data", f"no {' or '.join(FILES)} in or below {root}")
-    return [_sequence(folder.resolve(), files[folder].resolve()) for folder in sorted(files)]
+    return sequences
 
 
 def _sequence(folder: Path, file: Path) -> folders.Sequence:
     frames = _frames(folders.read_json(file), file)
-    images = tuple(_image(folder, frame["file_path"], f"{file}: frames[{index}].file_path") for index, frame in enumerate(frames))
+    images = tuple(_image(folder, frame["file_path"], f"{within}file_path") for within, frame in frames)
     return folders.Sequence(folder, folder.parent.name, folder.name, images, None, (), TransformsReader(file))
 
 
-def _frames(scene: Mapping[str, Any], file: Path) -> list[dict[str, Any]]:
+def _frames(scene: Mapping[str, Any], file: Path) -> list[tuple[str, dict[str, Any]]]:
+    """What each frame's fields are named after, such as `FILE: frames[7].`, and the frame, in the order of their images' names."""
     frames = scene.get("frames")
     if not isinstance(frames, list) or not frames:
         raise InvalidInput(f"{file}: frames", "is missing or empty; expected a list with file_path and transform_matrix each")
-    return sorted(frames, key=lambda frame: str(frame["file_path"]))
+    named = [(f"{file}: frames[{index}].", frame) for index, frame in enumerate(frames)]
+    for within, frame in named:
+        if not (isinstance(frame, dict) and isinstance(frame.get("file_path"), str)):
+            raise InvalidInput(f"{within}file_path", f"expected the name of an image, found {frame!r:.80}")
+    return sorted(named, key=lambda each: str(each[1]["file_path"]))
 
 
 def _image(folder: Path, name: str, field: str) -> Path:
@@ -80,59 +87,73 @@ def _image(folder: Path, name: str, field: str) -> Path:
     return found
 
 
-def _view(folder: Path, image: Path, frame: Mapping[str, Any], masks: bool, file: Path) -> View:
+def _view(folder: Path, image: Path, frame: Mapping[str, Any], masks: bool, within: str) -> View:
+    """`frame` has the scene's fields, too, where it has none of its own."""
     rgb, mask = read_rgba(image)
     if frame.get("mask_path"):
         mask = read_mask(folder / frame["mask_path"])
-    K, distortion = _intrinsics(frame, (rgb.shape[0], rgb.shape[1]), file)
-    depth_m = _depth(folder, frame, (rgb.shape[0], rgb.shape[1]))
+    K, distortion = _intrinsics(frame, (rgb.shape[0], rgb.shape[1]), within)
+    depth_m = _depth(folder, frame, (rgb.shape[0], rgb.shape[1]), within)
     if any(distortion):
         rgb, depth_m, mask = _undistorted(rgb, depth_m, mask, K, distortion)
     pose = np.eye(4)
-    pose[:3] = np.array(frame["transform_matrix"], dtype=float)[:3]
+    given = frame.get("transform_matrix")
+    rows = 3 if isinstance(given, list) and len(given) == 3 else 4  # some leave out the last
+    pose[:3] = folders.read_numbers(frame, "transform_matrix", (rows, 4), within)[:3]
     return View(rgb, depth_m, Camera(K, pose @ AXES), mask if masks and mask is not None and mask.any() else None)
 
 
-def _intrinsics(frame: Mapping[str, Any], size: tuple[int, int], file: Path) -> tuple[FloatArray, tuple[float, ...]]:
+def _intrinsics(frame: Mapping[str, Any], size: tuple[int, int], within: str) -> tuple[FloatArray, tuple[float, ...]]:
     """K, shape (3, 3), of an image of `size` (H, W), and its distortion as OpenCV takes it."""
+
+    def given(name: str) -> float:
+        return float(folders.read_numbers(frame, name, (), within))
+
     model = frame.get("camera_model", "OPENCV")
     if model not in PINHOLES:
-        raise InvalidInput(f"{file}: camera_model", f"expected one of {', '.join(sorted(PINHOLES))}, found {model!r}; undistort the images")
+        raise InvalidInput(f"{within}camera_model", f"expected one of {', '.join(sorted(PINHOLES))}, found {model!r}; undistort the images")
     height, width = size
-    scale = width / frame.get("w", width)
+    scale = width / given("w") if "w" in frame else 1.0
     if "fl_x" in frame:
-        fx = scale * frame["fl_x"]
+        fx = scale * given("fl_x")
     elif "camera_angle_x" in frame:
-        fx = width / 2 / np.tan(frame["camera_angle_x"] / 2)
+        fx = width / 2 / np.tan(given("camera_angle_x") / 2)
     else:
-        raise InvalidInput(f"{file}: fl_x", "is missing; expected a focal length in pixels, or camera_angle_x in radians")
-    fy = scale * frame["fl_y"] if "fl_y" in frame else fx
-    cx = scale * frame["cx"] if "cx" in frame else width / 2
-    cy = scale * frame["cy"] if "cy" in frame else height / 2
+        raise InvalidInput(f"{within}fl_x", "is missing; expected a focal length in pixels, or camera_angle_x in radians")
+    fy = scale * given("fl_y") if "fl_y" in frame else fx
+    cx = scale * given("cx") if "cx" in frame else width / 2
+    cy = scale * given("cy") if "cy" in frame else height / 2
     K = np.array([[fx, 0, cx - 0.5], [0, fy, cy - 0.5], [0, 0, 1]])
-    return K, tuple(float(frame.get(name, 0)) for name in DISTORTION)
+    return K, tuple(given(name) if name in frame else 0.0 for name in DISTORTION)
 
 
 def _depth_name(frame: Mapping[str, Any]) -> str | None:
     return frame.get("depth_file_path") or frame.get("depth_path")
 
 
-def _depth(folder: Path, frame: Mapping[str, Any], size: tuple[int, int]) -> NDArray[np.float32] | None:
+def _depth(folder: Path, frame: Mapping[str, Any], size: tuple[int, int], within: str) -> NDArray[np.float32] | None:
     """In the image's size (H, W): nerfstudio's `depth_file_path`, or Instant-NGP's `depth_path` with `integer_depth_scale`."""
     name = _depth_name(frame)
     if name is None:
         return None
-    path = folder / name
-    stored = np.load(path, allow_pickle=False) if path.suffix == ".npy" else read_units(path)
-    if "depth_file_path" in frame:
-        unit_m = frame.get("depth_unit_scale_factor", MILLIMETRES)
-    elif "integer_depth_scale" in frame:
-        unit_m = frame["integer_depth_scale"]
+    unit = "depth_unit_scale_factor" if "depth_file_path" in frame else "integer_depth_scale"
+    if unit in frame:
+        unit_m = float(folders.read_numbers(frame, unit, (), within))
+    elif unit == "depth_unit_scale_factor":
+        unit_m = MILLIMETRES
     else:
-        raise InvalidInput("integer_depth_scale", f"is missing beside depth_path {name}; expected metres a unit of the depth images")
-    depth_m = (stored * unit_m).astype(np.float32)
+        raise InvalidInput(f"{within}{unit}", f"is missing beside depth_path {name}; expected metres a unit of the depth images")
+    path = folder / name
+    depth_m = ((_array(path) if path.suffix == ".npy" else read_units(path)) * unit_m).astype(np.float32)
     resized = cv2.resize(np.nan_to_num(depth_m, posinf=0, neginf=0), size[::-1], interpolation=cv2.INTER_NEAREST_EXACT)
     return np.asarray(resized) if resized.any() else None
+
+
+def _array(path: Path) -> NDArray[Any]:
+    try:
+        return np.asarray(np.load(path, allow_pickle=False))
+    except (OSError, ValueError) as error:
+        raise InvalidInput(str(path), f"cannot be read as numpy's array of depth ({error})") from None
 
 
 def _undistorted(

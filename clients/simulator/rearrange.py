@@ -15,6 +15,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from clients.datasets.images import write_image
 from clients.errors import ServiceProblem
 from clients.robot import RobotClient
 from clients.simulator.arm import UP, Arm, ArmConfig
@@ -243,7 +244,7 @@ def _median(values: Sequence[float]) -> float | None:
 
 def write_picture(rows: Sequence[FloatArray], file: Path) -> None:
     """One row a trial."""
-    cv2.imwrite(str(file), np.vstack(rows), [cv2.IMWRITE_PNG_COMPRESSION, 9])
+    write_image(file, np.vstack(rows), [cv2.IMWRITE_PNG_COMPRESSION, 9])
 
 
 def write_json(trials: Sequence[Trial], summary: RearrangeSummary, settings: dict[str, object], file: Path) -> None:

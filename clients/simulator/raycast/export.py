@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from clients.datasets.folders import ABOUT, CAMERAS, TRUTH
 from clients.datasets.images import write_image
 from clients.simulator.raycast.categories import RECIPES
 from clients.simulator.raycast.model import Model
@@ -103,7 +104,7 @@ def write_sequence(folder: Path, model: Model, thing: WorldObject, views: Sequen
         "symmetries": [symmetry.ravel().tolist() for symmetry in model.symmetries],
         "split": "rendered",
     }
-    for name, content in (("scene_camera.json", cameras), ("scene_gt.json", truth), ("sequence.json", about)):
+    for name, content in ((CAMERAS, cameras), (TRUTH, truth), (ABOUT, about)):
         (folder / name).write_text(json.dumps(content))
 
 
@@ -118,7 +119,7 @@ def contact_sheet(folders: Sequence[Path], columns: int, file: Path, side: int =
         tiles.append(cv2.resize(image[:, left : left + height], (side, side), interpolation=cv2.INTER_AREA))
     tiles += [np.full_like(tiles[0], 255)] * (-len(tiles) % columns)
     rows = [np.hstack(tiles[start : start + columns]) for start in range(0, len(tiles), columns)]
-    cv2.imwrite(str(file), np.vstack(rows), [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
+    write_image(file, np.vstack(rows), [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
 
 
 def _write_images(folder: Path, number: int, view: View) -> None:

@@ -114,6 +114,29 @@ def test_grey_scenes_are_read(tmp_path: Path, shots: list[Any]) -> None:
     assert load_burst(bop.find_sequences(tmp_path)[0]).views[0].rgb.shape == (48, 64, 3)
 
 
+def test_linked_folders_are_followed_once(root: Path) -> None:
+    (root / "test" / "up").symlink_to(root)
+    assert [each.name for each in bop.find_sequences(root)] == ["000005/test-000001"]
+
+
+@pytest.mark.parametrize(
+    ("file", "change", "field"),
+    [
+        ("scene_gt.json", lambda scene: scene["0"][0].pop("cam_t_m2c"), "0[0].cam_t_m2c"),
+        ("scene_gt.json", lambda scene: scene["0"][0]["cam_R_m2c"].pop(), "0[0].cam_R_m2c"),
+        ("scene_camera.json", lambda scene: scene["0"].pop("depth_scale"), "0.depth_scale"),
+    ],
+)
+def test_what_is_wrong_with_a_scene_is_named(root: Path, file: str, change: Callable[[Any], object], field: str) -> None:
+    path = root / "test" / "000001" / file
+    scene = json.loads(path.read_text())
+    change(scene)
+    path.write_text(json.dumps(scene))
+    with pytest.raises(InvalidInput, match="expected .*number") as caught:
+        load_burst(bop.find_sequences(root)[0])
+    assert caught.value.field == f"{path}: {field}"
+
+
 def test_a_folder_without_scenes_is_named(tmp_path: Path) -> None:
     with pytest.raises(InvalidInput, match=r"scene_gt\.json"):
         bop.find_sequences(tmp_path)

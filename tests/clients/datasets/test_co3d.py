@@ -101,6 +101,12 @@ def test_the_cache_of_encodings_notices_other_cameras(root: Path) -> None:
     assert '"focal_length"' in sequence.reader.cameras(sequence)
 
 
+def test_the_cache_of_encodings_notices_which_depth_is_consistent(root: Path) -> None:
+    files = co3d.find_sequences(root)[0]
+    read = {path.relative_to(root / "cup" / "1_2_3").parts[0] for path in files.reader.files(files)}
+    assert read == {"images", "depths", "depth_masks"}
+
+
 def test_what_is_missing_or_broken_is_named(root: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
     with pytest.raises(InvalidInput, match=r"frame_annotations\.jgz"):
         co3d.find_sequences(tmp_path_factory.mktemp("empty"))

@@ -91,6 +91,7 @@ def edit(file: str, change: Callable[[Any], object]) -> Callable[[Path], object]
         (lambda folder: (folder / "sequence.json").write_text("[]"), "sequence.json", "expected a JSON object"),
         (edit("sequence.json", lambda about: about.pop("category")), "sequence.json: category", "expected a name, found None"),
         (edit("sequence.json", lambda about: about.pop("model_scale_mm")), "sequence.json: model_scale_mm", "expected a number"),
+        (edit("sequence.json", lambda about: about.update(longest_side_mm="long")), "sequence.json: longest_side_mm", "expected a number"),
         (lambda folder: shutil.rmtree(folder / "rgb"), "", "has no folder rgb"),
         (
             lambda folder: (folder / "rgb" / "000000.jpg").rename(folder / "rgb" / "left.jpg"),

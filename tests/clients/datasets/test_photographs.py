@@ -28,6 +28,13 @@ def test_each_folder_of_images_is_a_sequence_of_the_folder_around_it(tmp_path: P
     assert burst.views[0].depth_m is None
 
 
+def test_linked_folders_are_followed_once(tmp_path: Path, shots: list[Any]) -> None:
+    (tmp_path / "mug" / "red").mkdir(parents=True)
+    cv2.imwrite(str(tmp_path / "mug" / "red" / "0.png"), shots[0].rgb)
+    (tmp_path / "mug" / "up").symlink_to(tmp_path)
+    assert [each.name for each in photographs.find_sequences(tmp_path)] == ["mug/red"]
+
+
 def test_a_folder_without_images_is_named(tmp_path: Path) -> None:
     with pytest.raises(InvalidInput, match=r"CATEGORY/INSTANCE/\*\.jpg"):
         photographs.find_sequences(tmp_path)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -39,10 +40,21 @@ def test_a_copy_keeps_geometry_and_ground_truth(recordings: list[Sequence], tmp_
         assert (np.abs(neighbours - view.depth_m).min(axis=0) <= 2 * step).all()
 
 
+def test_recordings_without_truth_and_depth_are_copied_without(recordings: list[Sequence], tmp_path: Path) -> None:
+    folder = shutil.copytree(recordings[0].path, tmp_path / "data" / "car" / "bare")
+    (folder / "scene_gt.json").unlink()
+    shutil.rmtree(folder / "depth")
+    shrink(tmp_path / "data", tmp_path / "small", TINY)
+    (small,) = find_sequences(tmp_path / "small")
+    assert small.world_from_model is None
+    assert [(view.depth_m, view.size) for view in load_burst(small).views] == [(None, (160, 160))] * 3
+
+
 def test_the_draw_depends_on_the_seed_alone(recordings: list[Sequence]) -> None:
     config = ShrinkConfig(categories=3, instances=2)
-    names = [[each.name for each in draw(list(order), config, random.Random(4))] for order in (recordings, recordings)]
-    assert names[0] == names[1]
+    orders = [(recordings, 4), (recordings[::-1], 4), (recordings, 5)]
+    names = [[each.name for each in draw(order, config, random.Random(seed))] for order, seed in orders]
+    assert names[0] == names[1] != names[2]
     assert len(names[0]) == 6
 
 

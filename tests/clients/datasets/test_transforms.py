@@ -143,3 +143,51 @@ def test_what_is_missing_is_named(tmp_path: Path, shots: list[Any]) -> None:
     write(tmp_path / "b", shots, INTRINSICS, lambda n, shot: {"depth_path": depth_png(tmp_path / "b", n, shot, 0.001)})
     with pytest.raises(InvalidInput, match="integer_depth_scale"):
         load_burst(transforms.find_sequences(tmp_path / "b")[0])
+
+
+@pytest.mark.parametrize(
+    ("change", "field", "says"),
+    [
+        (lambda frame: frame.pop("transform_matrix"), "frames[2].transform_matrix", "expected 16 numbers, row by row, found None"),
+        (lambda frame: frame["transform_matrix"].append(1), "frames[2].transform_matrix", "expected 16 numbers"),
+        (lambda frame: frame.update(fl_x="wide"), "frames[2].fl_x", "expected a number, found 'wide'"),
+        (lambda frame: frame.pop("file_path"), "frames[2].file_path", "expected the name of an image"),
+        (lambda frame: frame.update(file_path="images/-.png"), "frames[2].file_path", "is no file"),
+    ],
+)
+def test_what_is_wrong_with_a_frame_is_named_by_its_place_in_the_file(
+    tmp_path: Path, shots: list[Any], change: Callable[[dict[str, Any]], object], field: str, says: str
+) -> None:
+    file = write(tmp_path / "a", shots, INTRINSICS, lambda n, shot: {}) / "transforms.json"
+    scene = json.loads(file.read_text())
+    scene["frames"].reverse()  # they are read in the order of their images' names
+    change(scene["frames"][2])
+    file.write_text(json.dumps(scene))
+    with pytest.raises(InvalidInput, match=says) as caught:
+        load_burst(transforms.find_sequences(tmp_path / "a")[0])
+    assert caught.value.field == f"{file}: {field}"
+
+
+def test_a_pose_may_leave_out_its_last_row(tmp_path: Path, shots: list[Any], prove: Callable[..., None]) -> None:
+    rows = [(shot.camera.world_from_camera @ OPENGL)[:3].tolist() for shot in shots]
+    write(tmp_path / "a", shots, INTRINSICS, lambda n, shot: {"transform_matrix": rows[n]})
+    prove(transforms.find_sequences(tmp_path / "a")[0], depth=False, mask=False)
+
+
+@pytest.mark.parametrize("content", [None, b"no array"])
+def test_an_array_of_depth_that_cannot_be_read_is_named(tmp_path: Path, shots: list[Any], content: bytes | None) -> None:
+    write(tmp_path / "a", shots, INTRINSICS, lambda n, shot: {"depth_file_path": "depth.npy"})
+    if content is not None:
+        (tmp_path / "a" / "depth.npy").write_bytes(content)
+    with pytest.raises(InvalidInput, match="cannot be read as numpy's array of depth") as caught:
+        load_burst(transforms.find_sequences(tmp_path / "a")[0])
+    assert caught.value.field == str(tmp_path / "a" / "depth.npy")
+
+
+def test_linked_folders_are_followed_once(tmp_path: Path, shots: list[Any]) -> None:
+    write(tmp_path / "cup" / "blue", shots, INTRINSICS, lambda n, shot: {})
+    chosen = tmp_path / "chosen"
+    chosen.mkdir()
+    (chosen / "cup").symlink_to(tmp_path / "cup")
+    (tmp_path / "cup" / "up").symlink_to(tmp_path)
+    assert [each.name for each in transforms.find_sequences(chosen)] == ["cup/blue"]
