@@ -1,7 +1,7 @@
 """The memory: one folder with a SQLite file and, beside it, the arrays and images that its rows name.
 
 FOLDER/
-├── memory.sqlite3      rows, [CLS] and pooled tokens
+├── memory.sqlite3      rows, and in them the tokens that decisions compare
 ├── lock                held by the process that writes here
 ├── categories/ID/      the reference's arrays and views
 ├── scans/ID/ID/        the views of each burst of a scan in progress
@@ -215,7 +215,8 @@ class Memory:
         """Computes everything anew from the kept views, with another backbone or again with the same, and then ties the memory to it.
 
         Either all of it happens or nothing does. Instances whose views are no longer kept are dropped where the backbone is another one,
-        and so are settings, which were calibrated with the first. `progress` counts categories and observations.
+        and so are settings, which were calibrated with the first; nor do its decisions count for later ones. `progress` counts categories
+        and observations.
 
         Raises Unavailable where a category cannot be computed.
         """

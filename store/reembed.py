@@ -7,7 +7,7 @@ memory is what it was; stopped after it, the old files are what no row names. Bo
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from sqlite_utils import Database
@@ -17,12 +17,13 @@ from core.encode import EncodedBurst, Encoder
 from core.errors import InvalidInput, OneLookError, Unavailable
 from core.packing import burst_as_arrays
 from core.reference import build_reference
+from core.scores import BEST
 from core.view_consistency import consistent_only
 from store.arrays import Array, arrays_file, write_arrays
 from store.audit import record
 from store.bursts import read_burst
 from store.categories import reference_columns
-from store.columns import files_from_json, files_to_json
+from store.columns import decision_from_json, decision_to_json, files_from_json, files_to_json
 from store.connection import Connection, Row
 from store.contents import FOLDERS
 from store.folders import Files, FileSum, sync
@@ -41,7 +42,7 @@ class Reembedded:
     dropped_instances: int
     """Their views were no longer kept."""
     dropped_observations: int
-    """The backbone found no object in them."""
+    """The backbone found no object in them, or their views are damaged."""
 
 
 @dataclass(frozen=True)
@@ -69,6 +70,7 @@ def reembed(connection: Connection, backbone: Backbone, *, actor: str | None = N
                 db.table("meta").insert({"key": key, "value": value}, replace=True)
             if other:
                 db.execute("DELETE FROM meta WHERE key LIKE 'setting:%'")
+                _retire_decisions(db, kept.get("backbone", "another"))
             before = {key: kept.get(key) for key in ("backbone", "fingerprint")}
             after = {"backbone": backbone.name, "fingerprint": backbone.fingerprint, "dropped_instances": result.dropped_instances}
             record(db, "reembed", None, before, after, actor)
@@ -120,6 +122,14 @@ def _beside(folder: Path, files: Files, name: str, arrays: Mapping[str, Array]) 
     sync(folder)
     old, _ = arrays_file(files)
     return {each: file for each, file in files.items() if each != old} | {name: FileSum.of((folder / name).read_bytes())}
+
+
+def _retire_decisions(db: Database, backbone: str) -> None:
+    """Within a transaction: what was found with another backbone is no sample of what objects of no known category find now."""
+    for row in list(db.query("SELECT id, decision FROM observations WHERE decision IS NOT NULL")):
+        decision = decision_from_json(row["decision"])
+        if decision.score == BEST:
+            db.table("observations").update(row["id"], {"decision": decision_to_json(replace(decision, score=f"{BEST} by {backbone}"))})
 
 
 def _switch(db: Database, anew: _Anew, other_backbone: bool) -> Reembedded:

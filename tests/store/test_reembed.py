@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ import pytest
 from core.backbones.base import Backbone
 from core.encode import EncodedBurst, Encoder
 from core.errors import Conflict, Unavailable
-from core.novelty import DecisionConfig, decide
+from core.novelty import Decision, DecisionConfig, decide
 from core.packing import burst_as_arrays
 from core.reference import build_reference
 from core.sim3 import Sim3
@@ -21,7 +22,7 @@ from store import reembed
 from store.memory import Memory
 from store.observations import Joins
 from store.records import Category
-from tests.store.conftest import KNOWN
+from tests.store.conftest import KNOWN, NOVEL
 
 
 @pytest.fixture(scope="module")
@@ -189,6 +190,29 @@ def test_tokens_of_the_first_backbone_are_not_remembered(learnt: Memory, other: 
     assert decide(learnt.instances.members(), before, DecisionConfig("pooled_best_view")).similarities[0][1] > 0.99
     learnt.reembed(other)
     assert decide(learnt.instances.members(), before, DecisionConfig("pooled_best_view")).similarities[0][1] < 0.9
+
+
+def judged(memory: Memory, category: Category, cup: Burst, backbone: Backbone) -> str:
+    """The id of an observation that was decided with this backbone, and is a sample for later ones."""
+    decision = Decision("novel", "best", float("inf"), ((category.id, 0.5),), rival=0.5)
+    return memory.observations.create(replace(NOVEL, decision=decision), cup, burst_as_arrays(Encoder(backbone).encode(cup))).id
+
+
+def test_what_the_first_backbone_found_is_no_sample_any_more(
+    learnt: Memory, category: Category, other: Backbone, cup: Burst, backbone: Backbone
+) -> None:
+    seen = judged(learnt, category, cup, backbone)
+    learnt.reembed(other)
+    (decision,) = learnt.observations.decisions(9)
+    assert (decision.score, decision.similarities) == ("best by colour", ((category.id, 0.5),))
+    assert decision.corrected(category.id).rival is None
+    assert learnt.observations.get(seen).decision == decision
+
+
+def test_what_the_same_backbone_found_stays_a_sample(learnt: Memory, category: Category, cup: Burst, backbone: Backbone) -> None:
+    judged(learnt, category, cup, backbone)
+    learnt.reembed(backbone)
+    assert [(decision.score, decision.rival) for decision in learnt.observations.decisions(9)] == [("best", 0.5)]
 
 
 def test_an_observation_that_cannot_be_computed_goes_with_its_burst(learnt: Memory, category: Category, other: Backbone) -> None:
