@@ -64,7 +64,9 @@ class Settings(BaseSettings):
     scan_views: int = Field(10, ge=2, le=MOST_VIEWPOINTS, description="Viewpoints that a scan asks for.")
     scan_expiry_h: float = Field(24, gt=0, description="Hours after which a scan expires that no views come for.")
     keep_observations: int = Field(1000, gt=0, description="Observations kept, with their views; the oldest are dropped.")
-    undo_days: float = Field(30, ge=0, description="Days for which a rename, merge, split or deletion can be undone.")
+    undo_days: float = Field(
+        30, ge=0, description="Days for which a rename, merge, split, correction, forgotten burst or deletion can be undone."
+    )
 
     @property
     def retention(self) -> Retention:

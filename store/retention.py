@@ -15,7 +15,7 @@ class Retention:
     observations: int = 1000
     """Most observations kept; each is some megabytes of views. The oldest goes, with its views, when one more is kept."""
     undo: timedelta = timedelta(days=30)
-    """How long a rename, merge, split, forgetting or deletion can be undone; then what it removed is removed for good."""
+    """How long a rename, merge, split, correction, forgetting or deletion can be undone; then what it removed is removed for good."""
     scans: timedelta = timedelta(hours=24)
     """A scan that no views come for expires after this."""
     requests: timedelta = timedelta(hours=24)

@@ -83,7 +83,7 @@ def list_changes(agent: AgentDep, limit: Annotated[int, Query(ge=1, le=1000, des
 
 @router.post("/v1/memory/audit/{entry_id}/undo", responses=problems(404, 409, 422, 503))
 def undo_change(entry_id: str, agent: AgentDep, actor: ActorDep) -> AuditEntry:
-    """Takes back a rename, merge, split or deletion; answers the entry that says so."""
+    """Takes back a rename, merge, split, correction, forgotten burst or deletion; answers the entry that says so."""
     return AuditEntry.of(agent.upkeep.undo(entry_id, actor=actor))
 
 

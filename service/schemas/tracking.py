@@ -111,7 +111,9 @@ class FrameAnswer(BaseModel):
     )
     reason: str | None = Field(description="Why this frame gave no pose.")
     outcome: Outcome | None = Field(description="Where the category was decided with this frame, or could not be.")
-    similarities: list[CategorySimilarity] = Field(description="Then every category compared with, most similar first.")
+    similarities: list[CategorySimilarity] = Field(
+        description="Then the categories, most similar first; with the score `best` those few that match best."
+    )
     latency_ms: float = Field(description="From the frame's arrival to this answer.")
 
     @staticmethod

@@ -111,3 +111,9 @@ def test_events_are_streamed_as_they_happen(live, stream, look, parts):
     ]
     assert heard[0][2]["outcome"] == "novel"
     assert [kind for kind, _, _ in stream(1, **{"Last-Event-ID": "2"})] == ["scan_deleted"]
+
+
+@pytest.mark.parametrize("said", ["9" * 5000, "-2", "two"])
+def test_a_last_id_that_nobody_gave_says_nothing(live, stream, look, parts, said):
+    httpx.post(f"{live}/v1/observations", files=parts(look()))
+    assert [kind for kind, _, _ in stream(1, **{"Last-Event-ID": said})] == ["observation"]
