@@ -37,7 +37,7 @@ class Cell:
 
 @dataclass(frozen=True)
 class Matrix:
-    """All pairs of views (paper, Figure 2)."""
+    """The pairs of views that were compared (paper, Figure 2): with many reference views each view of the burst is with some alone."""
 
     rows: int
     columns: int
@@ -52,7 +52,9 @@ class Matrix:
         """Of the pose of an observation."""
         similarity, matches = np.asarray(details.view_similarity, dtype=float), details.matches
         rows, columns = similarity.shape
-        low, high = float(similarity.min()), float(similarity.max())
+        compared = np.argwhere(similarity > 0)
+        values = similarity[similarity > 0] if len(compared) else np.zeros(1)
+        low, high = float(values.min()), float(values.max())
         inliers = np.zeros((rows, columns), dtype=int)
         np.add.at(inliers, (matches.reference_view[matches.inlier], matches.target_view[matches.inlier]), 1)
         chosen = set(details.pairs)
@@ -65,8 +67,7 @@ class Matrix:
                 (row, column) in chosen,
                 int(inliers[row, column]),
             )
-            for row in range(rows)
-            for column in range(columns)
+            for row, column in compared.tolist()
         ]
         return Matrix(rows, columns, low, high, tuple(cells), tuple(sorted({column for _, column in chosen})))
 

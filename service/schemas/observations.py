@@ -187,7 +187,9 @@ def _in_object_frame(turn: FloatArray, pose: records.Pose) -> list[float]:
 class Debug(BaseModel):
     """What a pose was computed from."""
 
-    view_similarity: list[list[float]] = Field(description="Similarity of reference view m and burst view n, shape (M, N).")
+    view_similarity: list[list[float]] = Field(
+        description="Similarity of reference view m and burst view n, shape (M, N); 0 where they were not compared."
+    )
     pairs: list[tuple[int, int]] = Field(description="(reference view, burst view) pairs whose correspondences were used.")
 
 

@@ -103,6 +103,11 @@ def page(browser: Browser, scheme: str, size: dict[str, int], address: str) -> I
         viewer.scroll_into_view_if_needed()
         viewer.locator("canvas").wait_for()
     opened.wait_for_load_state("load")
+    for part in opened.locator("[hx-trigger=load]").all():
+        part.wait_for(state="detached")  # what comes later is in its place
+    opened.evaluate(
+        "Promise.all([...document.images].map((image) => { image.loading = 'eager'; return image.decode().catch(() => null); }))"
+    )
     opened.evaluate("window.scrollTo(0, 0)")
     opened.wait_for_timeout(1500)
     yield opened

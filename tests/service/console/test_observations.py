@@ -117,6 +117,19 @@ def test_the_matrix_counts_inliers_of_each_pair():
     assert found.rests_on == (0, 1)
 
 
+NO_MATCHES = Matches(*(np.zeros(0, dtype) for dtype in (int, int, int, int, float, bool)))
+
+
+def test_pairs_that_were_not_compared_have_no_cell_and_no_part_in_the_scale():
+    found = Matrix.of(PoseDetails(NO_MATCHES, np.array([[28.0, 0.0], [44.0, 36.0]]), ((1, 0),)))
+    assert (found.low, found.high) == (28.0, 44.0)
+    assert [(cell.row, cell.column, cell.level) for cell in found.cells] == [(0, 0, 0.0), (1, 0, 1.0), (1, 1, 0.5)]
+
+
+def test_a_matrix_of_nothing_compared_is_empty():
+    assert Matrix.of(PoseDetails(NO_MATCHES, np.zeros((2, 2)), ())).cells == ()
+
+
 def test_stages_fill_the_bar():
     stages = Stage.all_of({"find": 30.0, "decide": 60.0, "refine": 10.0, "total": 100.0})
     assert [(stage.name, stage.part, stage.start, stage.width) for stage in stages] == [
