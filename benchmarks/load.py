@@ -13,6 +13,7 @@ import numpy as np
 
 from benchmarks.crowd import Errand, Record, crowd, require_loopback
 from benchmarks.load_plot import plot_load
+from benchmarks.pairs import ViewCounts, require_views
 from benchmarks.parallel import bar
 from benchmarks.tables import report
 from clients.asynchronous import AsyncRobotClient
@@ -68,9 +69,10 @@ def run(
 ) -> list[LoadRow]:
     """A row for each number of robots; prints a table.
 
-    The service is that of `taught_service`; raises InvalidInput for one on another machine.
+    The service is that of `taught_service`; raises InvalidInput for one on another machine, or for more views than were recorded.
     """
     sequences = find_sequences(data_or_samples(data))
+    require_views(sequences, [ViewCounts.parse(str(views))])
     with taught_service(url, sequences, {}) as address:
         errand = observing([folders.load_burst(each, range(views)) for each in sequences])
         rows = [load_row(count, seconds, record) for count, record in _levels(address, robots, seconds, errand, seed)]

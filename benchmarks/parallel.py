@@ -39,7 +39,11 @@ def map_jobs(function: Callable[[Job], Result], jobs: Sequence[Job], weight: Cal
     with single_threaded_children(), bar() as progress:
         task = progress.add_task(description, total=sum(weight(job) for job in jobs))
         if worker_count(len(jobs)) == 1:
-            return [function(job) for job in progress.track(jobs, task_id=task)]
+            results = []
+            for job in jobs:
+                results.append(function(job))
+                progress.advance(task, weight(job))
+            return results
         context = multiprocessing.get_context("spawn")
         with ProcessPoolExecutor(worker_count(len(jobs)), mp_context=context) as pool:
             futures = {pool.submit(function, job): job for job in jobs}

@@ -60,6 +60,11 @@ def test_load_is_put_on_this_machine_only(recorded: Path) -> None:
         load.run(None, None, robots=[1], seconds=1, views=3, data=recorded, url="http://robot.example:8000", seed=0)
 
 
+def test_more_views_than_were_recorded_are_refused_before_anything_is_asked(recorded: Path) -> None:
+    with pytest.raises(InvalidInput, match="^views: 9 were asked for, but egg/large has 4"):
+        load.run(None, None, robots=[1], seconds=1, views=9, data=recorded, url="http://127.0.0.1:9", seed=0)
+
+
 def test_fates_are_told_apart_and_refused_robots_wait(url: str) -> None:
     told = iter([None, ServiceProblem("full", status=503, retry_after_s=0.2), ServiceProblem("bad", status=422), Unreachable("gone")])
 
