@@ -1,4 +1,4 @@
-"""`onelook bench`: accuracy, discovery, speed, isolation, symmetries and robustness, each a table and JSON."""
+"""`onelook bench`: every benchmark that has a command, each a table and JSON."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ import typer
 
 from clients.cli.terminal import SOURCE
 
-app = typer.Typer(help="Measure accuracy, discovery, speed, isolation, symmetries and robustness.", no_args_is_help=True)
+app = typer.Typer(help="Measure how right, how fast and how robust it is: a table, and JSON.", no_args_is_help=True)
 
 Data = Annotated[Path, typer.Option(help=f"Recorded objects: {SOURCE}.")]
 JsonFile = Annotated[Path | None, typer.Option("--json", help='File for {"meta": …, "rows": …}.')]
-Seed = Annotated[int, typer.Option(help="Of every random choice.")]
+Seed = Annotated[int, typer.Option(min=0, help="Of every random choice.")]
 Backbone = Annotated[str, typer.Option(help="Name of a backbone (docs/operations.md), or a folder of the DINO family.")]
 Categories = Annotated[list[str] | None, typer.Option(help="Category of the simulator; may be repeated; all where left out.")]
 Samples = Annotated[Path | None, typer.Option(help="Folder of recorded objects; the samples of the repository where left out.")]

@@ -24,7 +24,7 @@ def rearrange(
     trials: Annotated[int, typer.Option(min=1, help="Objects to be brought to the goal of their category.")] = 50,
     category: Annotated[list[str] | None, typer.Option(help="Category of the simulator; may be repeated; ten where left out.")] = None,
     views: Annotated[int, typer.Option(min=2, help="Views in each burst.")] = 8,
-    seed: Annotated[int, typer.Option(help="Of objects, poses, rooms and faults.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Of objects, poses, rooms and faults.")] = 0,
     resume: Annotated[bool, typer.Option(help="Continue the interrupted batch in --out.")] = False,
     url: ServiceUrl = None,
     json: Json = False,

@@ -17,7 +17,7 @@ def samples(
     categories: Annotated[int, typer.Option(min=1, help="Categories to draw.")] = 5,
     instances: Annotated[int, typer.Option(min=1, help="Objects of each category.")] = 3,
     views: Annotated[int, typer.Option(min=2, help="Views of each object.")] = 12,
-    seed: Annotated[int, typer.Option(help="Of the draw.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Of the draw.")] = 0,
     json: Json = False,
 ) -> None:
     """Make small copies of recorded objects, in the same layout, drawn by a seed."""

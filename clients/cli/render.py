@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from clients.cli.terminal import Json, console, print_json, progress_bar
+from core.errors import InvalidInput
 
 SHEET = "contact-sheet.jpg"
 
@@ -17,7 +18,7 @@ def render(
     category: Annotated[list[str] | None, typer.Option(help="Category of the simulator; may be repeated; all where left out.")] = None,
     instances: Annotated[int, typer.Option(min=1, help="Objects of each category.")] = 4,
     views: Annotated[int, typer.Option(min=1, help="Views of each object.")] = 12,
-    seed: Annotated[int, typer.Option(help="Of objects, rooms, viewpoints and faults.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Of objects, rooms, viewpoints and faults.")] = 0,
     meshes: Annotated[
         Path | None, typer.Option(help="Folder CATEGORY/INSTANCE.obj, .glb or .ply to render in place of the simulator's own objects.")
     ] = None,
@@ -27,6 +28,8 @@ def render(
     from clients.simulator.raycast.export import contact_sheet, draw_models, export
     from clients.simulator.raycast.user_meshes import find_models
 
+    if meshes and category:
+        raise InvalidInput("--category", "is of the simulator's own objects; leave it or --meshes out")
     models = find_models(meshes) if meshes else draw_models(category or [], instances, seed)
     folders = list(progress_bar(export(models, views, out, seed), "rendering", len(models)))
     contact_sheet(folders, 8, out / SHEET)

@@ -31,7 +31,7 @@ def simulate(
     out: Out = Path("out/demo"),
     world: Annotated[WorldKind | None, typer.Option(help="Rendered, or recorded views; raycast where left out.")] = None,
     data: Annotated[str | None, typer.Option(help="Recordings for replay; the samples of the repository where left out.")] = None,
-    seed: Annotated[int | None, typer.Option(help="Of worlds, objects, their order and the views of each; 0 where left out.")] = None,
+    seed: Annotated[int | None, typer.Option(min=0, help="Of worlds, objects, their order and their views; 0 where left out.")] = None,
     views: Annotated[int | None, typer.Option(min=2, help="Views in the burst of each encounter; 8 where left out.")] = None,
     robots: Annotated[int | None, typer.Option(min=1, help="Robots that share the memory, each in a world of its own.")] = None,
     resume: Annotated[bool, typer.Option(help="Continue the interrupted run in --out.")] = False,
@@ -84,8 +84,6 @@ def service(url: str | None, out: Path, *, fresh: bool = True) -> Iterator[str]:
     memory = out / "memory"
     if fresh and memory.exists():
         shutil.rmtree(memory)
-    status = errors.status("starting the service")
-    status.start()
-    with local_service(memory, out / "service.log") as address:
+    with errors.status("starting the service") as status, local_service(memory, out / "service.log") as address:
         status.stop()
         yield address

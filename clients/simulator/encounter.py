@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from enum import Enum
 from typing import Any
 
@@ -114,7 +114,7 @@ class Encounter:
 
     def as_json(self) -> str:
         """One line."""
-        return json.dumps({**asdict(replace(self, verdict=self.verdict)), "verdict": self.verdict.value})
+        return json.dumps({**asdict(self), "verdict": self.verdict.value})
 
     @staticmethod
     def from_json(line: str) -> Encounter:

@@ -77,7 +77,8 @@ class Episode:
         truth: Truth | None = None,
         number: int = 0,
     ) -> None:
-        """`number` tells robots of one memory apart. Raises ClientError where the memory holds what this episode did not teach it."""
+        """`number` tells robots of one memory apart, whose `truth` they share. What the memory holds besides, nobody is asked about here:
+        see `require_own_memory`."""
         self._robot = robot
         self._conduct = conduct
         self._truth = truth or Truth()

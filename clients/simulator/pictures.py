@@ -76,7 +76,10 @@ def _scanned(robot: RobotClient, encounter: Encounter) -> str | None:
     if encounter.learnt is None:
         return None
     folder = f"/v1/categories/{encounter.learnt}/views"
-    pictures = [robot.picture(f"{folder}/{view}/rgb.png") for view in range(encounter.learnt_views)]
+    try:
+        pictures = [robot.picture(f"{folder}/{view}/rgb.png") for view in range(encounter.learnt_views)]
+    except NotFoundProblem:  # somebody deleted the category since
+        return None
     thumbnails = [_resized(_decode(picture), THUMBNAIL_SIDE) for picture in pictures]
     missing = -len(thumbnails) % THUMBNAIL_COLUMNS
     thumbnails += [np.zeros_like(thumbnails[0])] * missing

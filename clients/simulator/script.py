@@ -65,7 +65,7 @@ class Script:
     """In the burst of each encounter."""
     waypoints: Annotated[StrictInt, Field(ge=0)] = 0
     """Random ones from which an object taken for known is looked at once more, each view by itself."""
-    seed: StrictInt = 0
+    seed: Annotated[StrictInt, Field(ge=0)] = 0
     robots: Positive = 1
     """That share the memory, each in a world of its own."""
     teacher: StrictBool = False
@@ -149,6 +149,12 @@ def check(script: Script) -> Script:
     """The script itself. Raises InvalidInput naming the field that does not go with the others."""
     if script.waypoints and script.teacher:
         raise InvalidInput("waypoints", "are not visited where a teacher asks: leave them or the teacher out")
+    if script.robots > 1 and script.teacher:
+        raise InvalidInput("robots", "share no teacher: she teaches one; leave her or the other robots out")
+    if script.faults.lost_views and script.teacher:
+        raise InvalidInput("faults.lost_views", "are not lost where a teacher asks: leave them or the teacher out")
+    if script.categories and script.meshes:
+        raise InvalidInput("categories", "are the simulator's own or the recordings': leave them or the meshes out")
     if script.world != "raycast" and (script.meshes or script.faults.sensor):
         raise InvalidInput("meshes" if script.meshes else "faults.sensor", "is for the world `raycast`: recordings are as they are")
     if script.world != "replay" and script.data:

@@ -6,6 +6,7 @@ import json
 import subprocess
 import sys
 from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
 from types import SimpleNamespace
@@ -19,6 +20,7 @@ from typer.testing import CliRunner, Result
 import service.app
 from clients.cli import app
 from clients.cli.robot import _facts
+from clients.cli.simulate import service as simulated_service
 from clients.cli.terminal import console, errors, print_facts, print_table
 from clients.datasets import samples as shipped
 from clients.datasets.folders import Sequence
@@ -124,6 +126,15 @@ def test_every_option_says_what_it_is_for() -> None:
     assert list(silent(get_command(app), "onelook")) == []
 
 
+@pytest.mark.parametrize(
+    "command", ["render --out o", "simulate", "rearrange", "samples --data d --out o", "bench pose --data d", "bench rendering"]
+)
+def test_no_seed_is_negative(command: str) -> None:
+    refused = onelook(*command.split(), "--seed", -1)
+    assert refused.exit_code == 2
+    assert "--seed" in refused.output
+
+
 def test_the_demo_writes_its_report(url: str, recordings: list[Sequence], tmp_path: Path) -> None:
     done = onelook("simulate", "--url", url, "--data", recordings[0].path.parent, "--out", tmp_path / "demo", "--views", 3)
     assert done.exit_code == 0, done.output
@@ -172,6 +183,29 @@ def test_a_service_that_cannot_start_shows_its_log(monkeypatch: pytest.MonkeyPat
     monkeypatch.setenv("ONELOOK_MAX_VIEWS", "many")
     with pytest.raises(Unreachable, match="(?s)stopped; its log .*ONELOOK_MAX_VIEWS"), local_service(tmp_path / "memory", tmp_path / "log"):
         pass
+
+
+def test_nothing_spins_on_where_a_service_does_not_start(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    ended: list[str] = []
+
+    @contextmanager
+    def status(text: str) -> Iterator[Any]:
+        try:
+            yield SimpleNamespace(stop=lambda: None)
+        finally:
+            ended.append(text)
+
+    @contextmanager
+    def refused(memory: Path, log: Path) -> Iterator[str]:
+        raise Unreachable("the service stopped")
+        yield
+
+    monkeypatch.setattr(errors, "status", status)
+    monkeypatch.setattr("clients.simulator.local_service.local_service", refused)
+    monkeypatch.setattr("core.backbones.weights.embedded_weights", lambda report: None)
+    with pytest.raises(Unreachable), simulated_service(None, tmp_path):
+        pass
+    assert ended == ["looking for the backbone's weights", "starting the service"]
 
 
 def test_brackets_of_an_error_are_printed(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -130,6 +130,11 @@ def test_what_is_not_seen_is_left_undecided_and_the_robot_goes_on(
     assert disagreements(robot, [first, second]) == []
 
 
+def test_of_a_category_that_was_deleted_there_are_no_pictures(met: list[Encounter], robot: RobotClient) -> None:
+    pictures = fetch_pictures(robot, replace(met[0], learnt="gone", learnt_views=2))
+    assert (pictures.scanned, pictures.rgb) == (None, None)
+
+
 def test_lost_views_never_arrive(robot: RobotClient, recordings: list[Sequence]) -> None:
     (met,) = list(Episode(robot, [ReplaySubject(recordings[0])], Conduct(views=12, lost_views=0.5)))
     assert 1 <= met.views < 12

@@ -50,7 +50,7 @@ def tube(path: Points, radius: float | Sequence[float] | FloatArray, *, flat: fl
     radii = np.broadcast_to(np.asarray(radius, dtype=float), len(points))
     if smooth and len(points) > 2:
         points, radii = spline(np.column_stack([points, radii]), STEPS)[:, :3], spline(np.column_stack([points, radii]), STEPS)[:, 3]
-    elif not smooth or len(points) == 2:
+    else:
         share = np.linspace(0, len(points) - 1, STEPS // 2)
         points = np.stack([np.interp(share, np.arange(len(points)), points[:, axis]) for axis in range(3)], axis=1)
         radii = np.interp(share, np.arange(len(radii)), radii)
@@ -107,9 +107,7 @@ def prism(outline: Points, height: float, bevel: float = 0.0) -> Mesh:
     outward = np.stack([ahead[:, 1], -ahead[:, 0]], axis=1) / np.linalg.norm(ahead, axis=1, keepdims=True).clip(1e-12)
     quarter = np.linspace(0, np.pi / 2, 6)
     low = [(bevel * (1 - np.sin(angle)), bevel * (1 - np.cos(angle))) for angle in quarter]
-    levels = [*low, *((inset, height - z) for inset, z in reversed(low))] if bevel else [(0.0, 0.0), (0.0, height)]
-    if not bevel:
-        levels = [(0.0, z) for z in np.linspace(0, height, 8)]
+    levels = [*low, *((inset, height - z) for inset, z in reversed(low))] if bevel else [(0.0, z) for z in np.linspace(0, height, 8)]
     rows = [np.column_stack([flat - inset * outward, np.full(len(flat), z)]) for inset, z in levels]
     return loft(np.stack(rows))
 

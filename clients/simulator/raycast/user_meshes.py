@@ -24,10 +24,18 @@ USUAL_M = 0.3
 
 
 def find_models(folder: Path) -> list[Model]:
-    """Every mesh below `folder`, CATEGORY/INSTANCE.obj, .glb or .ply, sorted by path. Raises InvalidInput where there is none."""
+    """Every mesh below `folder`, CATEGORY/INSTANCE.obj, .glb or .ply, sorted by path.
+
+    Raises InvalidInput where there is none, or two are of one name.
+    """
     files = sorted(path for path in folder.rglob("*") if path.suffix.lower() in SUFFIXES)
     if not files:
         raise InvalidInput("meshes", f"no {', '.join(SUFFIXES)} below {folder}; expected CATEGORY/INSTANCE{SUFFIXES[0]}")
+    first: dict[tuple[str, str], Path] = {}
+    for file in files:
+        twin = first.setdefault((file.parent.name, file.stem), file)
+        if twin != file:
+            raise InvalidInput("meshes", f"{twin} and {file} are both {file.parent.name}/{file.stem}; leave one out, or rename it")
     return [load_model(file) for file in files]
 
 

@@ -26,6 +26,12 @@ def test_meshes_become_recordings_and_a_contact_sheet(tmp_path: Path) -> None:
     assert sequence.world_from_model.scale == pytest.approx(0.2 * 3**0.5)
 
 
+def test_categories_are_the_simulators_own(tmp_path: Path) -> None:
+    done = CliRunner().invoke(app, ["render", "--meshes", str(tmp_path), "--category", "mug", "--out", str(tmp_path / "out")])
+    assert done.exit_code == 1
+    assert "--category: is of the simulator's own objects" in done.output
+
+
 def test_an_unknown_category_is_one_sentence(tmp_path: Path) -> None:
     done = CliRunner().invoke(app, ["render", "--category", "unicorn", "--out", str(tmp_path / "out")])
     assert done.exit_code == 1

@@ -124,3 +124,11 @@ def test_what_holds_no_mesh_is_refused(tmp_path: Path) -> None:
         find_models(tmp_path)
     with pytest.raises(InvalidInput, match="is no file"):
         load_model(tmp_path / "x" / "none.obj")
+
+
+def test_two_meshes_of_one_name_are_named(tmp_path: Path) -> None:
+    first = obj(tmp_path)
+    twin = first.with_suffix(".ply")
+    ply(tmp_path).rename(twin)
+    with pytest.raises(InvalidInput, match=rf"{first.name} and .*{twin.name} are both {tmp_path.name}/a; leave one out"):
+        find_models(tmp_path)
