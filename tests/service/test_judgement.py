@@ -37,13 +37,20 @@ def test_learning_not_asked_for_leaves_no_trace(agent, look):
     assert agent.observe(look(), ObserveOptions(learn=False)).decision.threshold == seen.decision.threshold
 
 
+RATE = 0.4
+"""At which even the other kind of object is known; a tenth of it is still stricter."""
+
+
+def test_a_known_burst_above_the_stricter_level_joins(agent, look):
+    seen = agent.observe(look(), ObserveOptions(false_known_rate=RATE))
+    assert (seen.outcome, seen.decision.similarity > seen.decision.learn_above) == ("known", True)
+    assert [each.source_id for each in agent.memory.instances.of(seen.category_id)][1:] == [seen.id]
+
+
 def test_a_known_burst_below_the_stricter_level_does_not_join(agent, look):
-    (category,) = agent.memory.categories.all()
-    rate = 0.4  # a tenth of it is still stricter
-    seen = agent.observe(look(), ObserveOptions(false_known_rate=rate))
-    (_, *joined) = agent.memory.instances.of(category.id)
-    assert seen.decision.threshold < seen.decision.learn_above
-    assert bool(joined) == (seen.decision.similarity > seen.decision.learn_above)
+    seen = agent.observe(look("dark", views=2), ObserveOptions(false_known_rate=RATE))
+    assert (seen.outcome, seen.decision.similarity < seen.decision.learn_above) == ("known", True)
+    assert len(agent.memory.instances.of(seen.category_id)) == 1
 
 
 def test_an_uncertain_object_gets_viewpoints_and_no_category(agent, look):
