@@ -227,7 +227,7 @@ def move_instances(db: Database, instance_ids: Collection[str], category_id: str
 def _finish_scan(db: Database, scan_id: str, category_id: str) -> None:
     finished = db.execute(f"UPDATE scans SET state = 'completed', category_id = ? WHERE id = ? AND {OPEN}", [category_id, scan_id])
     if finished.rowcount != 1:
-        raise Conflict(f"scan {scan_id!r} was completed, deleted or expired meanwhile; GET /v1/scans/{scan_id} says which")
+        raise Conflict(f"scan {scan_id!r} was completed, expired or deleted meanwhile; GET /v1/scans/{scan_id} says which")
     db.execute("DELETE FROM scan_bursts WHERE scan_id = ?", [scan_id])
 
 
@@ -239,6 +239,5 @@ def _category(row: Row) -> Category:
         row["views"],
         row["instances"],
         tuple(json.loads(row["extent_m"])),
-        row["reference_sha256"],
         row["origin_id"],
     )

@@ -105,15 +105,12 @@ def problem(path: Path, expected: FileSum) -> str | None:
     return None if found == expected else f"its SHA-256 is {found.sha256[:12]}…, {expected.sha256[:12]}… was written"
 
 
-def remove_orphans(parent: Path, known: Collection[str]) -> list[str]:
-    """Removes what is in `parent` and not `known`, which a stopped process left behind; returns the names."""
+def remove_orphans(parent: Path, known: Collection[str]) -> None:
+    """Removes what is in `parent` and not `known`, which a stopped process left behind."""
     if not parent.is_dir():
-        return []
-    orphans = sorted(path.name for path in parent.iterdir() if path.name not in known)
-    for name in orphans:
-        path = parent / name
+        return
+    for path in [path for path in parent.iterdir() if path.name not in known]:
         if path.is_dir() and not path.is_symlink():
             shutil.rmtree(path, ignore_errors=True)
         else:
             path.unlink(missing_ok=True)
-    return orphans

@@ -227,7 +227,6 @@ def _observation(row: Row) -> Observation:
         row["scan_id"],
         row["scan_error"],
         json.loads(row["timings_ms"]),
-        row["features_sha256"],
         grounds_from_json(row["grounds"]) if row["grounds"] else None,
         np.array(json.loads(row["viewpoints"])).reshape(-1, 4, 4) if row["viewpoints"] else None,
         row["living_corrected_to"],

@@ -45,7 +45,6 @@ class Category:
     """Bursts assigned to it."""
     extent_m: tuple[float, float, float]
     """Edge lengths of the reference's oriented box, metres."""
-    reference_sha256: str
     origin_id: str
     """The id it has in the memory where it was learnt; another one after an import."""
 
@@ -196,7 +195,6 @@ class Observation:
     scan_error: str | None
     """Why a novel object has no scan."""
     timings_ms: dict[str, float]
-    features_sha256: str
     grounds: Grounds | None
     """How much the answer rests on; None where an earlier version did not record it."""
     viewpoints: NDArray[np.floating] | None = None
