@@ -43,10 +43,10 @@ class Hello(BaseModel):
 
     type: Literal["hello"]
     category_id: str | None = Field(None, description="Of the object; decided from the first frames where left out.")
-    window: int = Field(5, ge=1, le=LARGEST_WINDOW, description="Views that a pose rests on, the latest ones.")
-    variant: str = Field("ucd", description="Variant of the pose pipeline.")
+    window: int = Field(TrackOptions.window, ge=1, le=LARGEST_WINDOW, description="Views that a pose rests on, the latest ones.")
+    variant: str = Field(TrackOptions.variant, description="Variant of the pose pipeline.")
     weight: float = Field(TrackConfig.weight, gt=0, le=1, description="Of a new pose against the last one; 1 smooths nothing.")
-    seed: int = Field(0, ge=0, lt=2**31)
+    seed: int = Field(TrackOptions.seed, ge=0, lt=2**31)
 
     def options(self) -> TrackOptions:
         """As the tracker has them."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.metadata
 import time
+from dataclasses import fields
 
 import pytest
 from fastapi.testclient import TestClient
@@ -11,11 +12,12 @@ from fastapi.testclient import TestClient
 import service.app
 from core.calibration import Prior
 from core.errors import Conflict, InvalidInput, OneLookError, Unavailable
-from service.agent import Agent
+from service.agent import Agent, AgentConfig
 from service.app import create_app
 from service.errors import KINDS, problem_of
 from service.refusals import CalledOff, TooOften
 from service.settings import Settings
+from store.retention import Retention
 
 
 def test_probes(client):
@@ -97,6 +99,12 @@ def test_the_unexpected_is_a_problem_without_a_trace(settings, backbone, look, p
     assert (answer.status_code, answer.headers["content-type"]) == (500, "application/problem+json")
     assert "secret" not in answer.text
     assert "Traceback" not in answer.text
+
+
+def test_settings_left_out_are_the_defaults_of_the_agent_and_the_memory():
+    settings = Settings()
+    assert AgentConfig(**{each.name: getattr(settings, each.name) for each in fields(AgentConfig)}) == AgentConfig()
+    assert settings.retention == Retention()
 
 
 def test_every_kind_of_error_has_a_problem():
