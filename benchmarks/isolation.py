@@ -64,9 +64,10 @@ def run(data: Path, json: Path | None, sources: Sequence[str], limit: int | None
     rows: list[IsolationRow] = []
     for source in sources:
         files = encode_all(sequences, Encoder(network, EncoderConfig(foreground=source)))
-        rows += table_rows(
-            source, [(sequence.category, score) for sequence, file in zip(sequences, files) for score in _scores(sequence, file)]
-        )
+        scores = [(sequence.category, score) for sequence, file in zip(sequences, files) for score in _scores(sequence, file)]
+        if not scores:
+            raise InvalidInput("data", f"no silhouette below {data} is a view's; expected mask_visib/000000_000000.png for rgb/000000.*")
+        rows += table_rows(source, scores)
     meta = {"benchmark": "isolation", "data": data, "limit": limit, "backbone": network.name, "fingerprint": network.fingerprint}
     report(f"Isolation, {data}", rows, meta, json)
     return rows

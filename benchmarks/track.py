@@ -24,6 +24,7 @@ from benchmarks.tables import report
 from clients.datasets import folders
 from clients.datasets.samples import data_or_samples
 from clients.datasets.sources import find_sequences
+from clients.errors import problem_from_json
 from clients.robot import RobotClient
 from clients.tracking import MAX_MESSAGE_BYTES, Conversation, websocket_url
 from core.errors import InvalidInput
@@ -69,8 +70,10 @@ class Stream:
     dropped: int = 0
 
     def read(self, text: str | bytes, now_s: float) -> None:
-        """One message of the service."""
+        """One message of the service. Raises the ServiceProblem that it tells of."""
         message = json_.loads(text)
+        if message["type"] == "problem":
+            raise problem_from_json(message["problem"]["status"], message["problem"])
         if message["type"] == "dropped":
             self.dropped += message["frames"]
         elif message["type"] == "pose":
@@ -84,6 +87,8 @@ class Stream:
 
     def row(self, side_px: int, warm: bool) -> TrackRow:
         """In one line; the rate is over the time from the first frame to the last answer."""
+        if not self.answered_s:
+            return TrackRow(side_px, warm, len(self.sent_s), 0.0, np.nan, np.nan, np.nan, self.dropped, np.nan)
         late_ms = [1000 * (at - self.sent_s[each]) for each, at in self.answered_s.items()]
         p50, p95, p99 = np.percentile(late_ms, (50, 95, 99)).tolist()
         took_s = max(self.answered_s.values()) - min(self.sent_s.values())
@@ -139,8 +144,10 @@ async def _follow(url: str, category_id: str, frames: Sequence[View], rate_hz: f
         listening = asyncio.create_task(_listen(socket, stream))
         await _send(socket, messages, rate_hz, stream)
         end = time.monotonic() + LATE_S
-        while not stream.over and time.monotonic() < end:
+        while not (stream.over or listening.done()) and time.monotonic() < end:
             await asyncio.sleep(0.05)
+        if listening.done():
+            listening.result()  # raises what it was told of
         listening.cancel()
     return stream
 

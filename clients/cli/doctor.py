@@ -111,7 +111,7 @@ def python() -> Finding:
 def working_memory() -> Finding:
     """What the machine could give to a new process."""
     facts = dict(line.split(":", 1) for line in Path("/proc/meminfo").read_text().splitlines())
-    available_gb = int(facts["MemAvailable"].split()[0]) / 1e6
+    available_gb = int(facts["MemAvailable"].split()[0]) * 1024 / 1e9  # what it calls kB are 1024 bytes
     if available_gb >= LEAST_MEMORY_GB:
         return Finding("RAM", State.good, f"{available_gb:.1f} GB free")
     remedy = f"the service needs about {LEAST_MEMORY_GB:.0f} GB: stop other programs, or send fewer views (ONELOOK_MAX_VIEWS)"

@@ -48,6 +48,14 @@ def test_an_object_on_black_is_found(recorded: Path, small_world: Any) -> None:
     assert everything.views == 8
 
 
+def test_silhouettes_that_are_no_views_are_none(recorded: Path, small_world: Any) -> None:
+    small_world(isolation)
+    for mask in recorded.rglob("mask_visib/*.png"):
+        mask.rename(mask.with_name(f"{mask.stem[:6]}.png"))
+    with pytest.raises(InvalidInput, match="no silhouette below .* is a view's"):
+        isolation.run(recorded, None, ["saliency"], limit=None, backbone="colour")
+
+
 def test_silhouettes_are_needed(tmp_path: Path, recorded: Path) -> None:
     for mask in recorded.rglob("mask_visib/*.png"):
         mask.unlink()

@@ -157,6 +157,11 @@ def test_the_service_itself_on_its_port(url: str) -> None:
     assert "OneLook 0.1.0 answers" in found.found
 
 
+def test_free_memory_is_told_in_bytes_by_the_thousand(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Path, "read_text", lambda path: "MemTotal: 9 kB\nMemAvailable: 1953125 kB\n")
+    assert doctor.working_memory() == Finding("RAM", State.good, "2.0 GB free")
+
+
 def test_little_memory_and_little_disk(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(doctor, "LEAST_MEMORY_GB", 1e6)
     monkeypatch.setattr(doctor, "LEAST_DISK_GB", 1e9)
