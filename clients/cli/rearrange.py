@@ -33,15 +33,16 @@ def rearrange(
     from clients.robot import RobotClient
     from clients.simulator.journal import interrupted, kept
     from clients.simulator.raycast.export import draw_models
-    from clients.simulator.rearrange import Rearrangement, Trial, summarise, write_json, write_picture
+    from clients.simulator.rearrange import Rearrangement, Trial, drawn_before, summarise, write_json, write_picture
 
     categories = category or CATEGORIES
     draw_models(categories, 1, seed)  # says at once which category there is none of
     out.mkdir(parents=True, exist_ok=True)
     screen = errors if json else console
     settings: dict[str, object] = {"categories": categories, "trials": trials, "views": views, "seed": seed}
-    lines = out / "rearrange.jsonl"
+    lines, picture = out / "rearrange.jsonl", out / "rearrange.png"
     done = [Trial(**jsonlib.loads(line)) for line in interrupted(lines, settings)] if resume else []
+    earlier = drawn_before(picture) if resume else []
     with service(url, out, fresh=not resume) as address, RobotClient(address) as robot:
         batch = Rearrangement(robot, categories, trials, views, seed, done=len(done))
         with screen.status(f"{len(done) + 1} of {trials}") as status:
@@ -51,13 +52,13 @@ def rearrange(
                 screen.print(f"{trial.number:>3}  {trial.name or trial.category:<24} {how}", highlight=False)
                 status.update(f"{len(done) + 1} of {trials}")
                 if batch.pictured(trial):
-                    write_picture(batch.pictures, out / "rearrange.png")
+                    write_picture([*earlier, *batch.pictures], picture)
     summary = summarise(done)
     write_json(done, summary, settings, out / "rearrange.json")
     if json:
         print_json(asdict(summary))
         return
-    print_facts(_facts(summary) | {"written": f"{out / 'rearrange.json'}, {out / 'rearrange.png'}"})
+    print_facts(_facts(summary) | {"written": f"{out / 'rearrange.json'}, {picture}"})
 
 
 def _facts(summary: RearrangeSummary) -> dict[str, str]:

@@ -247,6 +247,12 @@ def write_picture(rows: Sequence[FloatArray], file: Path) -> None:
     write_image(file, np.vstack(rows), [cv2.IMWRITE_PNG_COMPRESSION, 9])
 
 
+def drawn_before(file: Path) -> list[FloatArray]:
+    """The rows that an interrupted batch has drawn, as one picture; none where it had not come so far."""
+    image = cv2.imread(str(file)) if file.is_file() else None
+    return [] if image is None else [np.asarray(image)]
+
+
 def write_json(trials: Sequence[Trial], summary: RearrangeSummary, settings: dict[str, object], file: Path) -> None:
     """Figures and one row a trial."""
     content = {"meta": settings, "summary": asdict(summary), "rows": [asdict(each) for each in trials]}

@@ -15,7 +15,7 @@ from clients.simulator import rearrange
 from clients.simulator.raycast.mesh import rotation_about
 from clients.simulator.raycast.sensor import SensorConfig
 from clients.simulator.raycast.world import RaycastWorld
-from clients.simulator.rearrange import Rearrangement, summarise, write_picture
+from clients.simulator.rearrange import Rearrangement, drawn_before, summarise, write_picture
 from core.sim3 import Sim3
 
 
@@ -106,6 +106,15 @@ def test_a_plan_that_is_off_is_measured_to_be_off(worlds: list[RaycastWorld], sm
     assert trial.motion_s > 5
     write_picture(trials.pictures, tmp_path / "rows.png")
     assert (tmp_path / "rows.png").stat().st_size > 1000
+
+
+def test_a_batch_that_goes_on_keeps_what_it_has_drawn(tmp_path: Path) -> None:
+    file = tmp_path / "rows.png"
+    assert drawn_before(file) == []
+    first, second = (np.full((4, 6, 3), grey, np.uint8) for grey in (50, 200))
+    write_picture([first], file)
+    write_picture([*drawn_before(file), second], file)
+    np.testing.assert_array_equal(drawn_before(file)[0], np.vstack([first, second]))
 
 
 def test_a_refused_plan_moves_nothing_and_counts_as_wrong(worlds: list[RaycastWorld], small: SensorConfig) -> None:
