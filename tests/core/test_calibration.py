@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.stats import norm
+from scipy.stats import norm, t
 
-from core.calibration import Calibration, Prior, Samples
+from core.calibration import PRIOR_SAMPLES, Calibration, Prior, Samples
 
 RNG = np.random.default_rng(0)
 PRIOR = Samples(tuple(np.random.default_rng(1).normal(0.5, 0.3, 20)), (2.0, 2.5))
@@ -21,9 +21,12 @@ def test_many_samples_of_its_own_give_the_quantile_asked_for(rate: float) -> Non
 
 def test_few_samples_leave_the_prior_and_are_more_careful() -> None:
     none, some = Calibration.fit([], PRIOR), Calibration.fit([0.1] * 5, PRIOR)
-    assert none.location == pytest.approx(np.median(PRIOR.rivals), abs=0.05)
+    assert none.location == pytest.approx(np.median(PRIOR.rivals))
     assert 0.1 <= some.location < none.location
-    assert none.threshold(0.01) > none.location + 2.33 * none.spread  # a normal distribution that is known would end there
+    predicted = t.ppf(0.99, PRIOR_SAMPLES - 1) * np.sqrt(
+        1 + 1 / PRIOR_SAMPLES
+    )  # of one more from a normal distribution of which so many are known
+    assert none.threshold(0.01) == pytest.approx(none.location + predicted * none.spread)
 
 
 def test_of_what_ships_the_upper_side_counts_too() -> None:
@@ -66,7 +69,8 @@ def test_one_rate_makes_three_levels_and_a_look_narrows_the_room_for_doubt() -> 
     asked, looked = calibration.levels(0.02), calibration.levels(0.02, looks=1)
     assert asked.known_above == calibration.threshold(0.02)
     assert (asked.uncertain_above, asked.learn_above) == (calibration.threshold(0.2), calibration.threshold(0.002))
-    assert calibration.threshold(0.2) < looked.uncertain_above < looked.known_above == asked.known_above
+    assert looked.uncertain_above == calibration.threshold(0.02 * np.sqrt(10))
+    assert asked.uncertain_above < looked.uncertain_above < looked.known_above == asked.known_above
 
 
 def test_after_a_look_nothing_is_uncertain_that_is_more_probably_wrong() -> None:

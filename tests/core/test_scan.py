@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from core.camera_poses import look_at, nearest_view
 from core.errors import InvalidInput
@@ -16,10 +17,11 @@ from core.views import Camera
 from .conftest import K, PaintedObject
 
 
-def test_up_is_inferred_from_level_cameras(moved: Sim3, painted: PaintedObject) -> None:
-    cameras = [view.camera for view in painted.encode(5, moved).views if view.camera]
+@pytest.mark.parametrize("rotation", Rotation.random(6, rng=0).as_matrix())
+def test_up_is_inferred_from_level_cameras_and_never_down(rotation: np.ndarray, painted: PaintedObject) -> None:
+    cameras = [view.camera for view in painted.encode(5, Sim3(1.0, rotation, np.zeros(3))).views if view.camera]
     up, source = infer_up(cameras)
-    assert up @ moved.rotation[:, 2] > 0.999
+    assert up @ rotation[:, 2] > 0.999
     assert source == "cameras"
 
 

@@ -75,10 +75,26 @@ def test_a_single_jump_is_ignored_and_a_lasting_one_believed() -> None:
     assert track.pose is not None
     assert np.allclose(track.pose.rotation, np.eye(3))
     assert track.data_age_s == pytest.approx(0.3)
-    for _ in range(2):
-        track = step(track, [turned(100)])
+    track = step(track, [turned(102)])
+    assert track.pose is not None
+    assert np.allclose(track.pose.rotation, np.eye(3))
+    track = step(track, [turned(100)])
     assert track.pose is not None
     assert np.allclose(track.pose.rotation, turned(100).rotation)
+
+
+def test_jumps_that_do_not_agree_are_never_believed() -> None:
+    track = step(Track(), [turned(0)])
+    for angle_deg in (100, 100, 200, 200, 100, 100):
+        track = step(track, [turned(angle_deg)])
+        assert track.pose is not None
+        assert np.allclose(track.pose.rotation, np.eye(3))
+
+
+@pytest.mark.parametrize(("scale", "jumps"), [(1.0, True), (2.0, False)])
+def test_how_far_is_a_jump_grows_with_the_object(scale: float, jumps: bool) -> None:
+    track = step(step(Track(), [turned(0, scale)]), [turned(0, scale, (0.15, 0, 0))])
+    assert (track.jumped is not None) == jumps
 
 
 def test_a_moved_object_is_a_jump_too() -> None:
@@ -110,6 +126,6 @@ def test_symmetries_turn_the_reference_about_its_middle() -> None:
     assert with_symmetries([pose], NONE, CENTER) == [pose]
 
 
-def test_a_blend_goes_half_way_in_every_part() -> None:
-    middle = blend(turned(10, 1.0), turned(50, 4.0, (0.2, 0, 0)), CENTER, 0.5)
-    assert np.allclose(middle.as_matrix(), turned(30, 2.0, (0.1, 0, 0)).as_matrix())
+def test_a_blend_goes_as_far_in_every_part() -> None:
+    quarter = blend(turned(10, 2.0), turned(50, 32.0, (0.2, 0, 0)), CENTER, 0.25)
+    assert np.allclose(quarter.as_matrix(), turned(20, 4.0, (0.05, 0, 0)).as_matrix())

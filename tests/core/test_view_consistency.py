@@ -50,6 +50,14 @@ def test_all_sides_of_an_object_stay(painted: PaintedObject, moved: Sim3) -> Non
     assert all(kept is view for kept, view in zip(consistent_only(encoded).views, encoded.views, strict=True))
 
 
+def test_two_views_are_enough_to_contradict_a_third(painted: PaintedObject) -> None:
+    encoded = painted.encode(3)
+    first, view, last = encoded.views
+    kept = consistent_only(replace(encoded, views=(first, before_the_object(view, 0.6), last))).views
+    assert len(kept[1].cells) < 0.5 * len(view.cells)
+    assert (kept[0], kept[2]) == (first, last)
+
+
 def test_of_two_views_that_differ_both_stay(painted: PaintedObject) -> None:
     encoded = with_table(painted.encode(2), 0)
     assert consistent_only(encoded) is encoded
