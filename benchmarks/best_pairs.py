@@ -35,6 +35,12 @@ class BestPairs:
         evidence = single_evidence(self.match[-1], self.prior)
         return evidence if self.agreement is None else evidence + self.prior.agreement_weight * self.agreements()
 
+    def most(self) -> float:
+        """Evidence that no burst exceeds in any memory: of the best match and pose, where nothing else matches."""
+        match = self.match[:, ~np.eye(self.match.shape[1], dtype=bool)]
+        least = min(float(match.min()), self.prior.usual.mean)
+        return float(self.match.max()) - least + (0.0 if self.agreement is None else self.prior.agreement_weight)
+
     def without(self, burst: int) -> BestPairs:
         """The same without a burst."""
         kept = np.delete(np.arange(self.match.shape[1]), burst)

@@ -22,6 +22,7 @@ from benchmarks.parallel import bar
 from clients.datasets import folders
 from core.backbones.weights import cache_folder
 from core.encode import EncodedBurst, Encoder
+from core.errors import NoObject
 from core.packing import burst_as_arrays, burst_from_arrays
 from core.view_consistency import consistent_only
 
@@ -46,7 +47,7 @@ def encode_all(sequences: Sequence[folders.Sequence], encoder: Encoder, folder: 
     Args:
         folder: where the files are kept; `encoded/` in the cache folder where None.
 
-    Raises NoObject where a sequence has no view with an object.
+    Raises NoObject, naming the sequence, where one has no view with an object.
     """
     files = [(folder or cache_folder() / "encoded") / f"{_key(sequence, encoder)}.npz" for sequence in sequences]
     missing = [(sequence, file) for sequence, file in zip(sequences, files, strict=True) if not file.exists()]
@@ -54,7 +55,10 @@ def encode_all(sequences: Sequence[folders.Sequence], encoder: Encoder, folder: 
         task = progress.add_task("encoding", total=len(missing))
         for sequence, file in missing:
             progress.update(task, description=f"encoding {sequence.name}")
-            write_encoded(file, encoder.encode(folders.load_burst(sequence)))
+            try:
+                write_encoded(file, encoder.encode(folders.load_burst(sequence)))
+            except NoObject as error:
+                raise NoObject(sequence.name, error.message) from error
             progress.advance(task)
     return files
 

@@ -48,6 +48,8 @@ def threshold_grid(name: str, pairs: PairScores | BestPairs, single: FloatArray,
     largest = float(between.max())
     trade = np.linspace(float(np.quantile(between, TRADE_ABOVE)), largest, TRADE)
     grid = [np.quantile(between, LEVELS), trade, np.linspace(largest, top, BEYOND), [own, top + TINY]]
-    if isinstance(pairs, PairScores) and pairs.aggregation == "sum":
+    if isinstance(pairs, BestPairs):
+        grid.append([pairs.most() + TINY])
+    elif pairs.aggregation == "sum":
         grid.append(np.geomspace(top, pairs.part.sum(axis=0).max() * SUM_REACH + TINY, SUMS))
     return np.unique(np.concatenate(grid))

@@ -9,6 +9,7 @@ import torch
 from benchmarks import calibrated
 from benchmarks.best_pairs import BestPairs, BestSource
 from benchmarks.matches import STAGES
+from benchmarks.thresholds import threshold_grid
 from core.calibration import Prior, Samples
 from core.evidence import Comparison, Entry, Usual, match_views
 
@@ -54,6 +55,15 @@ def test_evidence_is_the_service_s(pairs: BestPairs, patches: list[torch.Tensor]
     expected = Comparison.between(patches[target], entries, PRIOR.usual).ranked(str(without) if without >= 0 else None)
     assert [str(each) for each in categories[0]] == [category for category, _ in expected]
     np.testing.assert_allclose(evidence[0], [value for _, value in expected], atol=1e-5)
+
+
+def test_no_memory_gives_more_evidence_than_the_most(pairs: BestPairs) -> None:
+    grid = threshold_grid("best", pairs, pairs.single(), 0.3)
+    most, few = -np.inf, BestSource(pairs, room=10)
+    used = filled(few)
+    for target in range(len(LABELS)):
+        most = max(most, few.ranked(target, used, np.array([-1]))[1].max())
+    assert pairs.single().max() < most < grid[-1]
 
 
 def test_a_burst_can_be_left_out(pairs: BestPairs) -> None:

@@ -7,11 +7,13 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+import pytest
 
 import core
 from benchmarks.encoded import SOURCES, encode_all, read_encoded
 from clients.datasets.folders import find_sequences, load_burst
 from core.encode import Encoder, EncoderConfig
+from core.errors import NoObject
 
 ARRAYS = ("cells", "descriptors", "points_m", "saliency", "cls", "pooled")
 
@@ -72,3 +74,11 @@ def test_the_cache_depends_on_every_source_that_encodes() -> None:
     sources = {source for pattern in SOURCES for source in root.glob(pattern)}
     imported = {name for source in sources for name in re.findall(r"^from core\.([a-z0-9_]+)", source.read_text(), re.MULTILINE)}
     assert imported - {"errors", "clock", "backbones"} <= {source.stem for source in sources}
+
+
+def test_a_sequence_without_an_object_is_named(recorded: Path, tmp_path: Path, backbone) -> None:
+    (sequence,) = (each for each in find_sequences(recorded) if each.instance == "small")
+    for image in sequence.images:
+        cv2.imwrite(str(image), np.zeros_like(cv2.imread(str(image))))
+    with pytest.raises(NoObject, match="egg/small: no view shows an object"):
+        encode_all([sequence], Encoder(backbone), tmp_path / "cache")
