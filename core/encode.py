@@ -149,7 +149,9 @@ class Encoder:
             soft = self._fuse(view, whole[index], coarse[index], windows[index], fine[index]) * (found[index] is not None)
             views.append(self._assemble(view, windows[index], soft, features.patches[index], features.cls[index]))
         if not any(len(view.cells) for view in views):
-            raise NoObject("views", "no view shows an object that stands out from its background; aim the camera at it or send masks")
+            raise NoObject(
+                "views", "no view shows an object that stands out from its background: nothing does, or all; aim the camera or send masks"
+            )
         clock.lap("points")
         return EncodedBurst(tuple(views), self.backbone.fingerprint, clock.stage_ms)
 

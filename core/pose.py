@@ -79,7 +79,8 @@ class PoseConfig:
         if "consensus_deg" in chosen and config.consensus_deg is None:
             raise InvalidInput("consensus_deg", f"variant {variant} has no consensus of view pairs; leave it out, or take one with a c")
         if "estimator" in chosen and config.solver not in FITTING_SOLVERS:
-            raise InvalidInput("estimator", f"variant {variant} does not fit its correspondences; leave it out, or take one with a u")
+            fitting = ", ".join(name for name, each in VARIANTS.items() if each.solver in FITTING_SOLVERS)
+            raise InvalidInput("estimator", f"variant {variant} does not fit its correspondences; leave it out, or take one of {fitting}")
         return replace(config, **chosen)
 
 

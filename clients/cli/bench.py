@@ -14,7 +14,9 @@ app = typer.Typer(help="Measure how right, how fast and how robust it is: a tabl
 Data = Annotated[Path, typer.Option(help=f"Recorded objects: {SOURCE}.")]
 JsonFile = Annotated[Path | None, typer.Option("--json", help='File for {"meta": …, "rows": …}.')]
 Seed = Annotated[int, typer.Option(min=0, help="Of every random choice.")]
-Backbone = Annotated[str, typer.Option(help="Name of a backbone (docs/operations.md), or a folder of the DINO family.")]
+Backbone = Annotated[
+    str, typer.Option(help="Name of a backbone, or a folder of the DINO family; an unknown name is answered with all there are.")
+]
 Categories = Annotated[list[str] | None, typer.Option(help="Category of the simulator; may be repeated; all where left out.")]
 Samples = Annotated[Path | None, typer.Option(help="Folder of recorded objects; the samples of the repository where left out.")]
 Url = Annotated[str | None, typer.Option(help="A service of this machine; one of its own where left out.")]
@@ -34,7 +36,7 @@ def pose(
     ] = None,
     consensus: Annotated[list[float] | None, typer.Option(help="Angle of the consensus, degrees; may be repeated.")] = None,
     inlier: Annotated[list[float] | None, typer.Option(help="Inlier threshold as a share of the extent; may be repeated.")] = None,
-    estimator: Annotated[list[str] | None, typer.Option(help="Robust estimator, by its name in docs/method.md; may be repeated.")] = None,
+    estimator: Annotated[list[str] | None, typer.Option(help="Robust estimator (an unknown one lists all); may be repeated.")] = None,
     dof: Annotated[list[int] | None, typer.Option(help="7, or 9 with a scale for each axis; may be repeated.")] = None,
     seed: Seed = 0,
     backbone: Backbone = BACKBONE,

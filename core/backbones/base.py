@@ -36,7 +36,10 @@ class Features:
     cls: NDArray[np.float32]
     """[CLS] tokens of the last block after its LayerNorm, shape (V, D)."""
     attention: NDArray[np.float32]
-    """Last block's attention from [CLS] to each patch, mean over heads, scaled to a maximum of 1, shape (V, G, G)."""
+    """Last block's attention from [CLS] to each patch, mean over heads, scaled to a maximum of 1, shape (V, G, G).
+
+    Without `saliency` it alone tells the object: what exceeds `core.encode.EncoderConfig.attention_threshold` may be of it.
+    """
     saliency: NDArray[np.float32] | None
     """A decoder's foreground probability in [0, 1], shape (V, S, S), where the backbone has one."""
 

@@ -43,10 +43,10 @@ class RobustFit:
 
 
 class Estimator(Protocol):
-    """Fits a similarity to correspondences of which many are wrong. Deterministic for a seed."""
+    """Fits a similarity to correspondences of which 60 % and more may be wrong. Deterministic for a seed."""
 
     def __call__(self, source: FloatArray, target: FloatArray, threshold_m: float, seed: int) -> RobustFit:
-        """From shapes (K, 3), (K, 3).
+        """From shapes (K, 3), (K, 3). One agrees with a transform that carries it nearer than `threshold_m`, metres of the target.
 
         Raises NoPose where fewer than MIN_CORRESPONDENCES are given or agree (`require_enough`, `no_agreement`), and Unavailable where a
         library that comes with an extra, imported in the function, is not installed.

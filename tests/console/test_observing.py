@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import expect
 
+from service.console.pages import NAVIGATION
+
 MARKUP = "<img src=x onerror=alert(1)>"
 PHONE = {"width": 390, "height": 844}
 VIEWS = range(0, 12, 3)
@@ -33,8 +35,8 @@ def known(robot, recorded, taught):
 
 @pytest.fixture(scope="module")
 def paths(known):
-    """Every page of this module."""
-    return ("/", "/observations", f"/observations/{known.id}", "/try")
+    """All that the navigation leads to, and an observation's."""
+    return (*(link.path for link in NAVIGATION), f"/observations/{known.id}")
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])

@@ -18,7 +18,9 @@ from core.backbones.base import Backbone
 from core.backbones.dino import DinoBackbone, load
 from core.calibration import Prior
 from core.confidence import Confidence
+from core.encode import Encoder
 from core.errors import Unavailable
+from core.views import Burst
 
 ARCHITECTURE = Path(__file__).parents[2] / "docs" / "architecture.md"
 TINY = {"hidden_size": 24, "num_hidden_layers": 3, "num_attention_heads": 2, "intermediate_size": 48}
@@ -63,11 +65,16 @@ def test_what_stands_in_for_backbones_keeps_the_contract(backbone: Backbone, pro
     prove_backbone(backbone)
 
 
-def test_the_one_of_the_documents_keeps_the_contract(prove_backbone: Callable[[Backbone], None]) -> None:
+def test_the_one_of_the_documents_keeps_the_contract_and_finds_objects(
+    prove_backbone: Callable[[Backbone], None], recorded: Callable[[str, range], Burst]
+) -> None:
     (page,) = re.findall(r"```python\n(.*?OFFERS.*?)```", ARCHITECTURE.read_text(), re.DOTALL)
     written: dict[str, Any] = {}
     exec(page, written)
-    prove_backbone(written["OFFERS"]["pixels"](device="cpu", dtype=None, report=print))
+    backbone = written["OFFERS"]["pixels"](device="cpu", dtype=None, report=print)
+    prove_backbone(backbone)
+    for view in Encoder(backbone).encode(recorded("car/car_baja-bug", range(3))).views:
+        assert 0 < len(view.cells) < Encoder(backbone).config.grid ** 2
 
 
 def test_tokens_and_attention_are_the_models_own(tmp_path: Path) -> None:

@@ -55,7 +55,7 @@ def _shot(camera: Camera) -> Shot:
 
 @pytest.fixture
 def prove(shots: list[Shot]) -> Callable[..., None]:
-    """prove(sequence, world_from_truth=…, depth=…, mask=…): its views are the shots, and points project to where the images have them."""
+    """prove(sequence, depth=…, mask=…, tolerance_m=…): its views are the shots, and points project to where the images have them."""
 
     def check(sequence: Sequence, *, depth: bool = True, mask: bool = True, tolerance_m: float = 2e-3) -> None:
         burst = load_burst(sequence, masks=True)
