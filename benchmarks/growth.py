@@ -1,4 +1,4 @@
-"""Growth: what a decision, a start and the memory take as categories come, from ten to a hundred thousand.
+"""Growth: what a decision, a start and the memory take as categories come, by default from ten to ten thousand.
 
 The store is a real one: rows as the service writes them, without pictures and references, which a decision by tokens does not read. It
 grows from size to size, and at each a new process opens it and decides as the service does. The tokens are `benchmarks.synthetic_tokens`.

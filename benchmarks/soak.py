@@ -12,6 +12,7 @@ import numpy as np
 from benchmarks.crowd import FATES, Errand, Record, Sample, crowd
 from benchmarks.load import taught_service
 from benchmarks.load_plot import plot_soak
+from benchmarks.pairs import ViewCounts, require_views
 from benchmarks.parallel import bar
 from benchmarks.tables import print_table, write_json
 from clients.asynchronous import AsyncRobotClient
@@ -67,6 +68,7 @@ def run(
     The service is that of `load.taught_service`.
     """
     sequences = find_sequences(data_or_samples(data))
+    require_views(sequences, [ViewCounts.parse(str(views))])
     with taught_service(url, sequences, SETTINGS) as address:
         errand = living([folders.load_burst(each, range(views)) for each in sequences])
         record = _soak(address, robots, 60 * minutes, errand, seed)

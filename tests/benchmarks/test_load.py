@@ -63,6 +63,8 @@ def test_load_is_put_on_this_machine_only(recorded: Path) -> None:
 def test_more_views_than_were_recorded_are_refused_before_anything_is_asked(recorded: Path) -> None:
     with pytest.raises(InvalidInput, match="^views: 9 were asked for, but egg/large has 4"):
         load.run(None, None, robots=[1], seconds=1, views=9, data=recorded, url="http://127.0.0.1:9", seed=0)
+    with pytest.raises(InvalidInput, match="^views: 9 were asked for, but egg/large has 4"):
+        soak.run(None, None, minutes=1, most_growth=0.05, robots=1, views=9, data=recorded, url="http://127.0.0.1:9", seed=0)
 
 
 def test_fates_are_told_apart_and_refused_robots_wait(url: str) -> None:
