@@ -81,7 +81,7 @@ class Enrolled:
                     return self._compare(target, usual)
                 except _DamagedError as error:
                     self._left_out |= error.ids
-                    self._enrol()
+                    self._enrol(self._listed)
             return None
 
     @property
@@ -91,11 +91,11 @@ class Enrolled:
 
     def _update(self, listed: Sequence[Listed]) -> None:
         if listed is not self._listed:
-            self._listed = listed
-            self._enrol()
+            self._enrol(listed)
+            self._listed = listed  # last: where enrolling fails the next decision tries again
 
-    def _enrol(self) -> None:
-        self._near.update([member for member in self._listed if member.id not in self._left_out], self._source.pooled_means)
+    def _enrol(self, listed: Sequence[Listed]) -> None:
+        self._near.update([member for member in listed if member.id not in self._left_out], self._source.pooled_means)
 
     def _compare(self, target: EncodedBurst, usual: Usual) -> Comparison:
         self._adapt()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -143,6 +144,16 @@ def test_what_is_no_longer_kept_is_read_again(seen: Callable[[int, int], Encoded
     kept.read.clear()
     check_exact(kept, enrolled, seen(5, 9))
     assert kept.read
+
+
+def test_a_read_that_fails_once_is_tried_again(seen: Callable[[int, int], EncodedBurst], monkeypatch: pytest.MonkeyPatch) -> None:
+    kept = one_each(5)
+    enrolled = Enrolled(kept, WHITENING)
+    with monkeypatch.context() as failing:
+        failing.setattr(kept, "pooled_means", Mock(side_effect=OSError("disk")))
+        with pytest.raises(OSError, match="disk"):
+            decide(enrolled, seen(3, 9))
+    check_exact(kept, enrolled, seen(3, 9))
 
 
 def test_what_is_damaged_is_left_out_and_the_rest_goes_on(seen: Callable[[int, int], EncodedBurst]) -> None:
