@@ -28,6 +28,8 @@ MAX_COVER = 0.95
 COVERED = 0.5
 """Share of a patch's samples above which, being of the object, they make the patch one of its own."""
 
+FOREGROUNDS = ("auto", "attention", "saliency")
+
 
 @dataclass(frozen=True)
 class EncoderConfig:
@@ -52,6 +54,10 @@ class EncoderConfig:
     """Of the rest of the crop, it sees one patch in so many in both directions: enough to know where the object stands."""
     context_threshold: float = 0.4
     """Foreground probability in the first pass above which the second pass looks closer."""
+
+    def __post_init__(self) -> None:
+        if self.foreground not in FOREGROUNDS:
+            raise InvalidInput("foreground", f"expected one of {', '.join(FOREGROUNDS)}, found {self.foreground!r}")
 
 
 @dataclass(frozen=True, eq=False)

@@ -49,7 +49,7 @@ COVARIANCE_PRIOR = 32.0
 LEAST_VARIANCE = 1e-12
 """Added at least in every direction, so that a memory of one and the same token can be adapted to."""
 BATCH = 16
-"""Bursts matched at once: about 4 MB with ten views a side."""
+"""Bursts matched at once: cosines of about 1 MB with ten views a side."""
 
 
 def part_tokens(encoded: EncodedBurst, parts: int = PARTS) -> NDArray[np.float16]:

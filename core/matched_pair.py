@@ -21,7 +21,7 @@ from core.errors import InvalidInput
 from core.matches import Matches
 from core.surface import Surface
 from core.viewpoints import best_reference_per_target, relative_rotations
-from core.views import FloatArray
+from core.views import FloatArray, require_camera
 
 Pairs = list[tuple[int, int]]
 """(reference view, target view)"""
@@ -52,8 +52,7 @@ def require_comparable(reference: Described, target: EncodedBurst) -> None:
             f"was made with backbone {reference.fingerprint}, the burst with {target.fingerprint}; their tokens cannot be compared",
         )
     for index, view in enumerate(target.views):
-        if view.camera is None:
-            raise InvalidInput(f"views[{index}].K", "is missing: a pose needs K and world_from_camera for every view")
+        require_camera(view.camera, index)
 
 
 class MatchedPair:

@@ -61,14 +61,15 @@ class Reference:
 
 
 def build_reference(encoded: EncodedBurst) -> Reference:
-    """From one scan. Raises TooFewViews, or NoObject where too few points have measured depth."""
-    shown = [view for view in encoded.views if view.trusted.any()]
+    """From the views of one scan that have a camera. Raises TooFewViews, or NoObject where too few points have measured depth."""
+    views = tuple(view for view in encoded.views if view.camera is not None)
+    shown = [view for view in views if view.trusted.any()]
     if len(shown) < MIN_VIEWS:
         raise TooFewViews(
             "views", f"a reference needs at least {MIN_VIEWS} views that show the object with depth and camera, found {len(shown)}"
         )
     cameras = np.stack([view.camera.world_from_camera[:3, 3] for view in shown if view.camera is not None])
     cloud = remove_outliers(remove_support(encoded.cloud_m, cameras)).astype(np.float32)
-    basis = PcaBasis.fit(np.concatenate([view.descriptors for view in encoded.views]))
+    basis = PcaBasis.fit(np.concatenate([view.descriptors for view in views]))
     box = oriented_box(cloud)
-    return Reference(encoded.views, basis, cloud, box, find_symmetries(shown, basis, box), encoded.fingerprint)
+    return Reference(views, basis, cloud, box, find_symmetries(shown, basis, box), encoded.fingerprint)

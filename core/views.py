@@ -196,14 +196,15 @@ class Burst:
     @property
     def cameras(self) -> tuple[Camera, ...]:
         """The camera of every view. Raises InvalidInput where one is missing."""
-        return tuple(_require_camera(view, index) for index, view in enumerate(self.views))
+        return tuple(require_camera(view.camera, index) for index, view in enumerate(self.views))
 
     def select(self, indices: Sequence[int]) -> Burst:
         """The burst of the views at `indices`, in that order."""
         return Burst([self.views[index] for index in indices])
 
 
-def _require_camera(view: View, index: int) -> Camera:
-    if view.camera is None:
+def require_camera(camera: Camera | None, index: int) -> Camera:
+    """That of the view at `index`. Raises InvalidInput where there is none."""
+    if camera is None:
         raise InvalidInput(f"views[{index}].K", "is missing: a pose needs K and world_from_camera for every view")
-    return view.camera
+    return camera

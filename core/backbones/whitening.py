@@ -47,6 +47,7 @@ class Whitening:
     def save(self, name: str, folder: Path) -> Path:
         """Writes what `shipped` reads."""
         file = folder / f"{name}.npz"
+        file.parent.mkdir(parents=True, exist_ok=True)  # a hub's names have folders
         np.savez_compressed(file, mean=self.mean.astype(np.float32), matrix=self.matrix.astype(np.float16))
         return file
 

@@ -13,9 +13,10 @@ import torch
 from transformers import Dinov2Config, Dinov2Model, Dinov2WithRegistersConfig, Dinov2WithRegistersModel, ViTConfig, ViTModel
 
 from clients.cli import bench
-from core.backbones import BACKBONES, EMBEDDED, load_backbone, weights
+from core.backbones import BACKBONES, EMBEDDED, load_backbone, weights, whitening
 from core.backbones.base import Backbone
 from core.backbones.dino import DinoBackbone, load
+from core.backbones.whitening import Whitening
 from core.calibration import Prior
 from core.confidence import Confidence
 from core.encode import Encoder
@@ -101,6 +102,15 @@ def test_batches_do_not_change_features(tmp_path: Path, monkeypatch: pytest.Monk
     two_and_one = load_backbone(str(folder), dtype=torch.float32).extract(IMAGES).patches
     assert np.allclose(whole, one_by_one, atol=1e-5)
     assert np.allclose(whole, two_and_one, atol=1e-5)
+
+
+def test_statistics_of_a_backbone_of_a_hub_have_a_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(whitening, "STATISTICS", tmp_path)
+    fitted = Whitening.fit(np.random.default_rng(0).normal(size=(50, 4)))
+    fitted.save("someone/vit", tmp_path)
+    read = Whitening.shipped("someone/vit")
+    assert read is not None
+    np.testing.assert_array_equal(read.mean, fitted.mean)
 
 
 def test_what_ships_was_measured_with_the_embedded_one(embedded_backbone: Backbone) -> None:

@@ -102,6 +102,11 @@ def test_a_blank_wall_shows_no_object(backbone: Backbone) -> None:
         Encoder(backbone).encode(Burst([wall]))
 
 
+def test_an_unknown_foreground_is_refused() -> None:
+    with pytest.raises(InvalidInput, match="^foreground: expected one of auto, attention, saliency, found 'depth'"):
+        EncoderConfig(foreground="depth")
+
+
 def test_saliency_of_a_backbone_without_it_is_refused(burst: Burst, backbone: Backbone, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(backbone, "has_saliency", False)
     monkeypatch.setattr(backbone, "_decoder", None)
