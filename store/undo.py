@@ -14,21 +14,44 @@ from store.corrections import undo_correction
 from store.instances import is_empty
 from store.records import Action, AuditEntry
 
+ELSEWHERE = """
+    SELECT later.rowid, later.id, i.source_id, i.id FROM audit later
+    JOIN instances i ON i.source = 'observation' AND i.source_id = json_extract(later.after, '$.observation')
+    JOIN categories c ON c.id = i.category_id
+    WHERE later.rowid > (SELECT rowid FROM audit WHERE id = ?) AND later.action = 'correct' AND later.undone_by IS NULL
+    AND i.id != json_extract(later.after, '$.instance') AND i.removed_by IS NULL AND c.removed_by IS NULL
+"""
+"""Living bursts of observations that a correction after a change put elsewhere, as bursts of their own."""
+
 
 def undo(connection: Connection, entry: AuditEntry, actor: str | None) -> str:
     """Takes one change back and returns the id of the entry that says so.
 
-    Raises Conflict where it is undone already, too long ago, of a kind that cannot be undone, or changed again since.
+    Raises Conflict where it is undone already, too long ago, of a kind that cannot be undone, or changed again since; also where it would
+    bring back a burst whose observation was corrected since, which would be a member of two categories then.
     """
     if not entry.undoable:
         raise Conflict(f"change {entry.id!r} cannot be undone: {_why_not(connection, entry)}")
     undo_id = new_id()
     with connection.change(undo_id) as db:
+        elsewhere = _elsewhere(db, entry)
         record(db, "undo", entry.category_id, {"entry": entry.id, "action": entry.action}, {}, actor, entry_id=undo_id)
         first = db.execute("UPDATE audit SET undone_by = ? WHERE id = ? AND undone_by IS NULL", [undo_id, entry.id])
         if first.rowcount != 1 or not REVERSE[entry.action](db, entry, undo_id):
             raise Conflict(f"change {entry.id!r} cannot be undone: what it changed was changed again since; undo the later change first")
+        if back := _elsewhere(db, entry) - elsewhere:
+            _, correction, observation, _ = max(back)
+            since = f"observation {observation!r} was corrected since, by change {correction!r}"
+            raise Conflict(f"change {entry.id!r} cannot be undone: {since}; undo the later change first")
     return undo_id
+
+
+def _elsewhere(db: Database, entry: AuditEntry) -> set[tuple[int, str, str, str]]:
+    """Corrections by age, their observations, and bursts of these that live beside what was corrected.
+
+    Compared before and after an undo: imported copies of a burst share its `source_id`, and live beside it with good reason.
+    """
+    return set(db.execute(ELSEWHERE, [entry.id]).fetchall())
 
 
 def _why_not(connection: Connection, entry: AuditEntry) -> str:

@@ -176,3 +176,71 @@ def test_the_last_burst_of_a_category_is_not_taken_back_from_it(memory: Memory, 
     with pytest.raises(Conflict, match="undo the later change first"):
         memory.undo(corrected.id)
     assert memory.categories.get(category.id).instances == 1
+
+
+def test_a_deletion_is_not_taken_back_while_its_burst_stands_elsewhere(
+    memory: Memory, category: Category, other: Category, assigned: Observation, encoded
+) -> None:
+    memory.categories.delete(category.id)
+    deleted = last(memory)
+    memory.corrections.to_category(assigned.id, other.id, encoded)
+    corrected = last(memory)
+    with pytest.raises(Conflict, match=f"{assigned.id}' was corrected since, by change '{corrected.id}'; undo the later change first"):
+        memory.undo(deleted.id)
+    assert [each.id for each in memory.categories.all()] == [other.id]
+    memory.undo(corrected.id)
+    memory.undo(deleted.id)
+    assert [each.instances for each in memory.categories.all()] == [2, 1]
+
+
+def test_a_forgotten_burst_does_not_come_back_while_it_stands_elsewhere(
+    memory: Memory, category: Category, other: Category, assigned: Observation, encoded
+) -> None:
+    memory.instances.forget(category.id, assignment(memory, assigned).id)
+    forgotten = last(memory)
+    memory.corrections.to_category(assigned.id, other.id, encoded)
+    with pytest.raises(Conflict, match="undo the later change first"):
+        memory.undo(forgotten.id)
+    assert assignment(memory, assigned).category_id == other.id
+
+
+def test_a_merge_is_not_taken_back_while_its_burst_stands_elsewhere(
+    memory: Memory, category: Category, other: Category, assigned: Observation, reference, burst, encoded
+) -> None:
+    third = memory.categories.create(reference, burst, encoded)
+    memory.categories.merge(category.id, third.id)
+    merged = last(memory)
+    memory.categories.delete(third.id)
+    memory.corrections.to_category(assigned.id, other.id, encoded)
+    with pytest.raises(Conflict, match="was corrected since, by change .*; undo the later change first"):
+        memory.undo(merged.id)
+    assert [each.id for each in memory.categories.all()] == [other.id]
+
+
+def test_a_correction_out_of_the_bin_is_not_taken_back_while_its_burst_stands_elsewhere(
+    memory: Memory, category: Category, other: Category, assigned: Observation, reference, burst, encoded
+) -> None:
+    third = memory.categories.create(reference, burst, encoded)
+    memory.corrections.to_category(assigned.id, other.id, encoded)
+    first = last(memory)
+    memory.categories.delete(other.id)
+    memory.corrections.to_category(assigned.id, third.id, encoded)
+    with pytest.raises(Conflict, match="was corrected since, by change .*; undo the later change first"):
+        memory.undo(first.id)
+    assert assignment(memory, assigned).category_id == memory.observations.get(assigned.id).corrected_to == third.id
+
+
+def test_what_was_imported_again_is_no_reason_to_keep_a_deletion(
+    memory: Memory, category: Category, other: Category, assigned: Observation, encoded, tmp_path
+) -> None:
+    memory.require_backbone("colour", "fingerprint-a")
+    path = memory.export(tmp_path / "cup.zip", [category.id]).path
+    memory.categories.delete(category.id)
+    deleted = last(memory)
+    memory.import_archive(path)
+    memory.categories.rename(other.id, "bowl")
+    renamed = last(memory)
+    memory.undo(deleted.id)
+    memory.corrections.to_category(assigned.id, other.id, encoded)
+    memory.undo(renamed.id)
+    assert [each.name for each in memory.categories.all()] == ["cup", "mug", "cup"]
