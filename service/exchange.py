@@ -16,13 +16,15 @@ KEY = "Idempotency-Key"
 LONGEST_KEY = 200
 REPEATED = "Idempotency-Replayed"
 """Header of an answer that was given before."""
+CLOCKED = {"list_scans", "get_scan", "list_observations", "get_observation", "list_changes"}
+"""GETs whose answers time alone changes: a scan expires, a change can no longer be undone, and the memory's version says so late."""
 
 
 class MemoryRoute(GuardedRoute):
     """A route that reads or changes the memory.
 
-    A GET is answered with an ETag that the memory's version gives, and with 304 where the caller has that version already. A POST with
-    an Idempotency-Key is carried out once: its repetitions get the first answer again.
+    A GET is answered with an ETag that the memory's version gives, or the answer itself where it is one of CLOCKED, and with 304 where the
+    caller has that already. A POST with an Idempotency-Key is carried out once: its repetitions get the first answer again.
     """
 
     def around(self, answer: Answering) -> Answering:
@@ -31,7 +33,7 @@ class MemoryRoute(GuardedRoute):
 
         async def exchange(request: Request) -> Response:
             if "GET" in methods:
-                return await _conditional(request, answer)
+                return await (_compared if self.name in CLOCKED else _conditional)(request, answer)
             if "POST" in methods:
                 return await _once(request, answer, self.path_format)
             return await answer(request)
@@ -43,8 +45,21 @@ async def _conditional(request: Request, answer: Answering) -> Response:
     memory = running(request).agent.memory
     version = await run_sync(lambda: memory.version)  # before the answer is made: it may be newer than its tag, never older
     tag = f'W/"{version}"'
+    return _tagged(Response(status_code=304) if _has(request, tag) else await answer(request), tag)
+
+
+async def _compared(request: Request, answer: Answering) -> Response:
+    response = await answer(request)
+    tag = f'W/"{hashlib.sha256(response.body).hexdigest()}"'
+    return _tagged(Response(status_code=304) if _has(request, tag) else response, tag)
+
+
+def _has(request: Request, tag: str) -> bool:
     known = {each.strip() for each in request.headers.get("if-none-match", "").split(",")}
-    response = Response(status_code=304) if known & {tag, "*"} else await answer(request)
+    return bool(known & {tag, "*"})
+
+
+def _tagged(response: Response, tag: str) -> Response:
     response.headers["ETag"] = tag
     response.headers["Cache-Control"] = "private, no-cache"  # to be kept, and asked for again with If-None-Match
     return response

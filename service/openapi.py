@@ -37,7 +37,7 @@ KEY_SCHEME = {
     "scheme": "bearer",
     "description": "A key that `onelook keys create` made. While a memory never had one, nobody is asked for it.",
 }
-ETAG = {"ETag": {"description": "Changes with the memory.", "schema": {"type": "string"}}}
+ETAG = {"ETag": {"description": "Another one where the answer may have changed.", "schema": {"type": "string"}}}
 
 
 def install(app: FastAPI, routes: list[Any]) -> None:

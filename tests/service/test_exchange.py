@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import re
 import threading
+from datetime import datetime, timedelta, timezone
 from pathlib import Path
 
 import pytest
 from fastapi.testclient import TestClient
 
 from service.app import create_app
-from service.exchange import MemoryRoute
+from service.exchange import CLOCKED, MemoryRoute
 from service.guarded import GuardedRoute
 from service.routes.install import MADE, ROUTERS
+from store import audit, scans
 from tests.service.conftest import LONG_S, Gate
 
 ROOT = Path(__file__).parents[2]
@@ -177,3 +179,42 @@ def test_a_change_makes_another_tag(client, learn):
     after = client.get(path, headers={"If-None-Match": before})
     assert (after.status_code, after.json()["name"]) == (200, "ball")
     assert after.headers["etag"] != before
+
+
+def in_two_months(monkeypatch):
+    """Sets the clock of scans and of undoing forward; nobody prunes."""
+    later = datetime.now(timezone.utc) + timedelta(days=60)
+    monkeypatch.setattr(scans, "now", later.isoformat)
+    monkeypatch.setattr(audit, "ago", lambda span: (later - span).isoformat())
+
+
+def test_a_scan_that_expired_is_sent_again_before_it_is_pruned(client, look, parts, monkeypatch):
+    seen = client.post("/v1/observations", files=parts(look())).json()
+    paths = {
+        f"/v1/scans/{seen['scan']['id']}": lambda answer: answer["state"] == "expired",
+        "/v1/scans": lambda answer: answer["scans"] == [],
+        f"/v1/observations/{seen['id']}": lambda answer: answer["scan"]["state"] == "expired",
+        "/v1/observations": lambda answer: answer["observations"][0]["scan"]["state"] == "expired",
+    }
+    tags = {path: client.get(path).headers["etag"] for path in paths}
+    for path, tag in tags.items():
+        assert client.get(path, headers={"If-None-Match": tag}).status_code == 304, path
+    in_two_months(monkeypatch)
+    for path, over in paths.items():
+        again = client.get(path, headers={"If-None-Match": tags[path]})
+        assert (again.status_code, over(again.json())) == (200, True), path
+        assert again.headers["etag"] != tags[path]
+
+
+def test_a_change_that_can_no_longer_be_undone_is_sent_again(client, ball, monkeypatch):
+    client.patch(f"/v1/categories/{ball['id']}", json={"name": "globe"})
+    first = client.get("/v1/memory/audit", params={"limit": 1})
+    assert first.json()["entries"][0]["undoable"]
+    in_two_months(monkeypatch)
+    again = client.get("/v1/memory/audit", params={"limit": 1}, headers={"If-None-Match": first.headers["etag"]})
+    assert (again.status_code, again.json()["entries"][0]["undoable"]) == (200, False)
+
+
+def test_what_time_changes_are_reads_of_the_memory():
+    reads = {route.name for router in ROUTERS for route in router.routes if isinstance(route, MemoryRoute) and "GET" in route.methods}
+    assert reads >= CLOCKED
