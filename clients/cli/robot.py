@@ -76,14 +76,15 @@ def scan(
     views: Views = None,
     json: Json = False,
 ) -> None:
-    """Teach the memory a category from one recorded object."""
+    """Teach the memory a category from one recorded object; what is wrong with a view is said on standard error."""
     _, recorded = _recording(folder)
     with connected(url, local) as robot:
         with errors.status("looking for the object"):
             request = robot.scan(recorded.select(_spread(recorded, GLANCE_VIEWS)))
-        burst = recorded.select(_spread(recorded, views))
-        for view in progress_bar(burst.views, "sending views", len(burst)):
-            request.add(view)
+        places = _spread(recorded, views)
+        for place in progress_bar(places, "sending views", len(places)):
+            for fault in request.add(recorded.views[place]):
+                errors.print(f"view {place}: {fault}")
         with errors.status("learning"):
             category = request.complete(name)
     if json:

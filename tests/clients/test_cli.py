@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -26,6 +27,7 @@ from clients.datasets import samples as shipped
 from clients.datasets.folders import Sequence
 from clients.errors import Unreachable
 from clients.simulator.local_service import local_service
+from core import quality
 from core.errors import InvalidInput
 from store.memory import Memory
 
@@ -80,6 +82,13 @@ def test_answers_in_other_formats(url: str, recordings: list[Sequence]) -> None:
     assert {tuple(line.split(",")[i] for i in (0, 2)) for line in lines} == {("0", "1")}
     message = json.loads(onelook("observe", folder, "--views", 3, "--format", "vision_msgs", "--url", url).output)
     assert len(message["detections"]) == 1
+
+
+def test_a_scan_says_what_is_wrong_with_a_view(url: str, recordings: list[Sequence], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(quality, "LEAST_SHARPNESS", 1e9)
+    taught = onelook("scan", recordings[0].path, "--views", 2, "--json", "--url", url)
+    assert json.loads(taught.stdout)["views"] == 2
+    assert re.search(r"^view 0: its sharpness is .*hold still", taught.stderr, re.MULTILINE)
 
 
 def test_photographs_ask_what_an_object_is(url: str, recordings: list[Sequence]) -> None:
