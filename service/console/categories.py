@@ -8,6 +8,8 @@ import numpy as np
 from fastapi import APIRouter, Query, Request, Response
 from fastapi.responses import HTMLResponse, JSONResponse
 
+from core.errors import Unavailable
+from core.reference import Reference
 from service.agent import Agent
 from service.console.change import done
 from service.console.facts import health, symmetry_words, variance_bars
@@ -75,25 +77,33 @@ def category_cover(category_id: str, agent: AgentDep, side: Side = None) -> Resp
 
 @router.get("/{category_id}")
 def category(request: Request, category_id: str, agent: AgentDep, change: Annotated[str | None, Query()] = None) -> HTMLResponse:
-    """One of them."""
+    """One of them; of a damaged reference it says so, and shows the rest, so that the category can be deleted."""
     found = agent.memory.categories.get(category_id)
     summary = agent.memory.categories.summary(category_id)
-    reference = agent.memory.categories.reference(category_id)
+    reference, damage = _reference(agent, category_id)
     return render(
         request,
         "category.html",
         category=found,
         summary=summary,
         health=health(summary),
-        reference=reference,
-        symmetries=symmetry_words(reference),
-        variance=variance_bars(reference.basis.explained),
+        damage=damage,
+        symmetries=symmetry_words(reference) if reference else [],
+        variance=variance_bars(reference.basis.explained) if reference else [],
         instances=agent.memory.instances.of(category_id),
         goals=agent.memory.goals.of(category_id),
         entries=agent.memory.audit.of(category_id, HISTORY),
         names=agent.names(),
         done=done(agent, change),
     )
+
+
+def _reference(agent: Agent, category_id: str) -> tuple[Reference | None, str | None]:
+    """It, or what is wrong with it."""
+    try:
+        return agent.memory.categories.reference(category_id), None
+    except Unavailable as error:
+        return None, str(error)
 
 
 @router.get("/{category_id}/scene")

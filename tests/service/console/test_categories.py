@@ -105,6 +105,20 @@ def test_a_category_that_is_not_there_is_a_page_that_says_so(client):
     assert answer.headers["content-type"].startswith("text/html")
 
 
+def test_a_category_whose_reference_is_damaged_says_so_and_can_be_deleted(client, cup, settings):
+    (settings.data_dir / "categories" / cup / "reference.npz").write_bytes(b"")
+    page = client.get(f"/categories/{cup}")
+    assert page.status_code == 200
+    assert re.search(r'role="alert">\s*<strong>Its reference is damaged</strong>\s*<p>[^<]*reference.npz', page.text)
+    assert set(re.findall(r"/views/\d/(\w+).png", page.text)) == {"rgb"}
+    assert "data-scene" not in page.text
+    assert len(re.findall('type="checkbox"', page.text)) == 2
+    assert f'href="/categories/{cup}/delete"' in page.text
+    assert client.get(f"/categories/{cup}/delete").status_code == 200
+    follow(client, f"/categories/{cup}/delete")
+    assert client.get(f"/categories/{cup}").status_code == 404
+
+
 def test_the_scene_is_the_reference(client, cup):
     scene = client.get(f"/categories/{cup}/scene").json()
     assert [cloud["choice"] for cloud in scene["clouds"]] == ["Image", "Components"]
