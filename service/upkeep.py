@@ -104,7 +104,7 @@ class Upkeep:
         """Writes categories, all where None, to a file that does not exist yet. Raises NotFound, Conflict and Unavailable."""
         made = self._memory.export(path, category_ids)
         chosen = None if category_ids is None else list(category_ids)
-        self._memory.note("export", {"categories": made.categories, "chosen": chosen}, actor=actor)
+        self._memory.note("export", {"categories": made.categories, "chosen": chosen, "left_out": made.left_out}, actor=actor)
 
     def import_archive(self, archive: bytes, *, actor: str | None = None) -> Import:
         """Takes in the categories of another memory. Raises InvalidInput and Conflict, and nothing is taken in then."""

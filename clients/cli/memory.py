@@ -111,7 +111,8 @@ def export_categories(
     if json:
         print_json(asdict(done) | {"path": str(done.path)})
     else:
-        console.print(f"{done.path}: {done.categories} categories, {_megabytes(done.size)}")
+        without = f", without {done.left_out} damaged instances" if done.left_out else ""
+        console.print(f"{done.path}: {done.categories} categories, {_megabytes(done.size)}{without}", soft_wrap=True)
 
 
 @app.command("import")

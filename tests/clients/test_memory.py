@@ -82,6 +82,13 @@ def test_categories_travel_in_a_file(data_dir: Path, tmp_path: Path) -> None:
     assert "cup was here already" in memory("import", tmp_path / "cups.zip", "--data-dir", tmp_path / "other").output
 
 
+def test_an_export_tells_what_it_leaves_out(data_dir: Path, tmp_path: Path) -> None:
+    with Memory.open(data_dir) as stored, stored._connection.change() as db:
+        db.execute("UPDATE instances SET cls = zeroblob(4) WHERE rowid = (SELECT min(rowid) FROM instances)")
+    assert "without 1 damaged instances" in memory("export", tmp_path / "all.zip", "--data-dir", data_dir).output
+    assert answered("export", tmp_path / "again.zip", "--data-dir", data_dir)["left_out"] == 1
+
+
 @pytest.mark.parametrize(
     ("words", "says"),
     [

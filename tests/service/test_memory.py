@@ -90,6 +90,14 @@ def test_some_categories_can_be_exported(client, other, learn):
     assert [category["name"] for category in brought["categories"]] == ["stone"]
 
 
+def test_an_export_without_damaged_instances_says_so_in_the_trail(client, ball, look, parts):
+    client.post("/v1/observations", files=parts(look()), params={"category_id": ball["id"]})
+    with client.app.state.running.agent.memory._connection.change() as db:
+        db.execute("UPDATE instances SET cls = zeroblob(4) WHERE source = 'observation'")
+    assert client.post("/v1/memory/export").status_code == 200
+    assert client.get("/v1/memory/audit").json()["entries"][0]["after"] == {"categories": 1, "chosen": None, "left_out": 1}
+
+
 def test_what_cannot_be_exported_or_imported(client, other, learn):
     assert client.post("/v1/memory/export", params={"category_id": ["nope"]}).status_code == 404
     assert client.post("/v1/memory/export").status_code == 409

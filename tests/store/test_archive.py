@@ -109,6 +109,18 @@ def test_a_category_without_sound_tokens_is_not_exported_and_is_named(
     assert learnt.export(tmp_path / "all.zip", [other.id]).categories == 1
 
 
+def test_a_damaged_instance_is_left_out_and_counted(
+    learnt: Memory, category: Category, other: Category, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    (damaged,) = learnt.instances.of(category.id)
+    learnt.categories.merge(category.id, other.id)
+    assert learnt.export(tmp_path / "whole.zip").left_out == 0
+    with learnt._connection.change() as db:
+        db.execute("UPDATE instances SET cls = zeroblob(4) WHERE id = ?", [damaged.id])
+    assert learnt.export(tmp_path / "all.zip").left_out == 1
+    assert f"leaves out 1 damaged instances of category {other.id}" in caplog.text
+
+
 def test_an_export_never_replaces_a_file_and_is_never_empty(learnt: Memory, second: Memory, archive: Path, tmp_path: Path) -> None:
     with pytest.raises(Conflict, match="exists"):
         learnt.export(archive)
