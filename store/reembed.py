@@ -149,7 +149,9 @@ def _switch(db: Database, anew: _Anew, other_backbone: bool) -> Reembedded:
             db.execute("DELETE FROM instances WHERE id = ?", [instance["id"]])
             dropped += 1
     empty = "SELECT id FROM categories WHERE id NOT IN (SELECT category_id FROM instances WHERE removed_by IS NULL)"
-    for category in list(db.query(f"{empty} AND removed_by IS NULL")):  # the object it was learnt from is one of its kind
+    # The object that a category was learnt from is one of its kind; what was merged has its bursts elsewhere.
+    may_return = "(removed_by IS NULL OR removed_by IN (SELECT id FROM audit WHERE action = 'delete'))"
+    for category in list(db.query(f"{empty} AND {may_return}")):
         insert_instance(db, category["id"], anew.references[category["id"]], source="scan", source_id=None, how="scan")
     lost = sum(table == "observations" for table, _ in anew.lost)
     return Reembedded(len(anew.categories), instances, len(anew.observations), dropped, lost)

@@ -172,6 +172,29 @@ def test_what_is_in_the_bin_comes_back_with_the_other_backbone_too(learnt: Memor
     assert len(learnt.instances.members()) == 2
 
 
+def test_what_lost_its_bursts_in_the_bin_does_not_come_back_empty(learnt: Memory, category: Category, other: Backbone) -> None:
+    with learnt._connection.change() as db:
+        db.execute("UPDATE instances SET pictures = NULL")
+    learnt.categories.delete(category.id)
+    entry = learnt.audit.latest(1)[0]
+    assert learnt.reembed(other).dropped_instances == 2
+    assert learnt.instances.members() == []
+    learnt.undo(entry.id)
+    assert [each.how for each in learnt.instances.of(category.id)] == ["scan"]
+
+
+def test_what_was_merged_gets_no_burst_of_its_own(
+    learnt: Memory, category: Category, other: Backbone, cup: Burst, backbone: Backbone
+) -> None:
+    encoded = Encoder(backbone).encode(cup)
+    second = learnt.categories.create(build_reference(encoded), cup, encoded)
+    learnt.categories.merge(second.id, category.id)
+    entry = learnt.audit.latest(1)[0]
+    learnt.reembed(other)
+    learnt.undo(entry.id)
+    assert learnt.categories.get(second.id).instances == 1
+
+
 def test_an_export_after_it_is_of_the_other_backbone(learnt: Memory, other: Backbone, tmp_path: Path) -> None:
     learnt.reembed(other)
     with Memory.open(tmp_path / "new") as new:
