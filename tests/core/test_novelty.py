@@ -39,6 +39,27 @@ def test_the_most_similar_category_is_chosen_above_the_threshold(score: str, pai
     assert decide(memory, burst_of(painted, kind), DecisionConfig(score, own)).outcome == "novel"
 
 
+@pytest.mark.parametrize("score", sorted(SCORES))
+def test_categories_are_ranked_by_similarity_and_as_similar_ones_by_name(score: str, painted: PaintedObject) -> None:
+    kind, other = np.eye(2, 48), np.eye(48)[5:7]
+    memory = [Member("c", kind, kind), Member("a", other, other), Member("b", kind, kind)]
+    decision = decide(memory, burst_of(painted, kind), DecisionConfig(score, 0.25))
+    assert [category for category, _ in decision.similarities] == ["b", "c", "a"]
+    assert (decision.score, decision.threshold, decision.uncertain_above, decision.learn_above) == (score, 0.25, 0.25, 0.25)
+
+
+def test_best_ranks_as_similar_categories_by_name(painted: PaintedObject) -> None:
+    memory = [replace(SIX_KINDS[0], category_id=name) for name in ("c", "b")]
+    assert [category for category, _ in decide(memory, seen(painted, 0, 9)).similarities] == ["b", "c"]
+
+
+@pytest.mark.parametrize("score", sorted(SCORES))
+def test_enrolled_members_serve_best_alone(score: str, painted: PaintedObject) -> None:
+    with pytest.raises(InvalidInput, match=f"^score: {score} compares whole members") as refused:
+        decide(Enrolled(NOTHING, None), burst_of(painted, np.eye(1, 48)), DecisionConfig(score))
+    assert refused.value.field == "score"
+
+
 def test_an_unknown_score_is_named(painted: PaintedObject) -> None:
     with pytest.raises(InvalidInput, match="paper_mean"):
         decide([], burst_of(painted, np.eye(1, 48)), DecisionConfig("nonsense"))
@@ -188,7 +209,7 @@ def test_a_threshold_of_the_callers_own_leaves_no_third_answer(painted: PaintedO
 
 @pytest.mark.parametrize("rate", [0.0, 0.6, -1.0, float("nan")])
 def test_an_impossible_rate_is_refused(rate: float) -> None:
-    with pytest.raises(InvalidInput, match="false_known_rate"):
+    with pytest.raises(InvalidInput, match=f"^false_known_rate: expected a share above 0 and at most 0.5, found {rate}"):
         DecisionConfig(false_known_rate=rate)
 
 

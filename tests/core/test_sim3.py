@@ -36,6 +36,15 @@ def test_matrix_round_trip(transform: Sim3) -> None:
     assert same(Sim3.from_matrix(transform.as_matrix()), transform)
 
 
+def test_a_turn_about_a_point_leaves_it_where_it_is() -> None:
+    quarter = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
+    center = np.array([1.0, 2, 3])
+    turn = Sim3.turn_about(center, quarter)
+    assert turn.scale == 1
+    assert np.allclose(turn.apply(center), center)
+    assert np.allclose(turn.apply(center + [1, 0, 2]), center + [0, 1, 2])
+
+
 def test_a_matrix_by_hand() -> None:
     rotation = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
     matrix = Sim3(2.0, rotation, np.array([3.0, 4, 5])).as_matrix()
