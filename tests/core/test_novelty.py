@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
 
 from core.backbones.whitening import Whitening
 from core.encode import EncodedBurst
+from core.enrolled import Enrolled
 from core.errors import InvalidInput
 from core.evidence import PARTS, part_tokens, whitened
 from core.novelty import VERIFIED, Context, Decision, DecisionConfig, Member, decide
@@ -56,7 +58,7 @@ def test_best_ranks_as_similar_categories_by_name(painted: PaintedObject) -> Non
 @pytest.mark.parametrize("score", sorted(SCORES))
 def test_enrolled_members_serve_best_alone(score: str, painted: PaintedObject) -> None:
     with pytest.raises(InvalidInput, match=f"^score: {score} compares whole members") as refused:
-        decide(Enrolled(NOTHING, None), burst_of(painted, np.eye(1, 48)), DecisionConfig(score))
+        decide(Enrolled(Mock(), None), burst_of(painted, np.eye(1, 48)), DecisionConfig(score))
     assert refused.value.field == "score"
 
 
