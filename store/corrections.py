@@ -99,5 +99,6 @@ def undo_correction(db: Database, entry: AuditEntry, undo_id: str) -> bool:
             return False
     elif is_empty(db, after["category"]):
         return False
-    db.execute("UPDATE observations SET corrected_to = ? WHERE id = ?", [before["corrected_to"], after["observation"]])
+    as_left = "UPDATE observations SET corrected_to = ? WHERE id = ? AND corrected_to = ?"  # one corrected since stays where it is
+    db.execute(as_left, [before["corrected_to"], after["observation"], after["category"]])
     return True

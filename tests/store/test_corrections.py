@@ -140,6 +140,18 @@ def test_a_second_correction_goes_back_to_the_first(memory: Memory, category: Ca
     assert memory.observations.get(unassigned.id).corrected_to == category.id
 
 
+def test_what_was_corrected_again_out_of_the_bin_stays_corrected(
+    memory: Memory, category: Category, other: Category, unassigned, encoded
+) -> None:
+    memory.corrections.to_category(unassigned.id, category.id, encoded)
+    first = last(memory)
+    memory.categories.delete(category.id)
+    memory.corrections.to_category(unassigned.id, other.id, encoded)
+    memory.undo(first.id)
+    assert memory.observations.get(unassigned.id).corrected_to == other.id
+    assert assignment(memory, unassigned).category_id == other.id
+
+
 def test_what_was_corrected_again_since_is_not_taken_back(memory: Memory, category: Category, other: Category, unassigned, encoded) -> None:
     memory.corrections.to_category(unassigned.id, category.id, encoded)
     first = last(memory)
