@@ -44,9 +44,9 @@ class SoakResult:
     refused: int
     failed: int
     early_mb: float
-    """Resident memory once it has settled."""
+    """The least resident memory of the part after it has settled."""
     late_mb: float
-    """At the end."""
+    """The least of the last part."""
     growth: float
     """Share of the first by which the second is larger."""
 

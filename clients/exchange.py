@@ -140,7 +140,8 @@ def address(url: str) -> str:
     """The address itself. Raises InvalidInput where no service can be at it."""
     try:
         parsed = httpx.URL(url)
-    except httpx.InvalidURL:
+        parsed.host.encode("idna")
+    except (httpx.InvalidURL, UnicodeError):
         parsed = httpx.URL()
     if parsed.scheme not in {"http", "https"} or not parsed.host:
         raise InvalidInput("url", f"expected an address such as http://127.0.0.1:8000 or http://[::1]:8000, found {url!r}")

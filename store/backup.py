@@ -62,8 +62,10 @@ def back_up(connection: Connection, folder: Path, progress: Progress = untold) -
         sync(partial)
         partial.rename(folder)
         sync(folder.parent)
-    except (OSError, sqlite3.Error) as error:
+    except (OSError, sqlite3.OperationalError) as error:
         raise Unavailable(f"cannot back up to {folder}: {error}; free space, or choose another folder") from error
+    except sqlite3.Error as error:
+        raise Unavailable(f"{connection.root / DATABASE} is damaged: {error}; restore it from a backup") from error
     finally:
         shutil.rmtree(partial, ignore_errors=True)  # there is none once it has its name
     return Backup(folder, report.files, report.size, report.damages)

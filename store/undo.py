@@ -16,19 +16,21 @@ from store.records import Action, AuditEntry
 
 ELSEWHERE = """
     SELECT later.rowid, later.id, i.source_id, i.id FROM audit later
-    JOIN instances i ON i.source = 'observation' AND i.source_id = json_extract(later.after, '$.observation')
+    CROSS JOIN instances i ON i.source = 'observation' AND i.source_id = json_extract(later.after, '$.observation')
     JOIN categories c ON c.id = i.category_id
     WHERE later.rowid > (SELECT rowid FROM audit WHERE id = ?) AND later.action = 'correct' AND later.undone_by IS NULL
     AND i.id != json_extract(later.after, '$.instance') AND i.removed_by IS NULL AND c.removed_by IS NULL
+    AND (i.observation_id IS NOT NULL OR NOT EXISTS (SELECT 1 FROM observations o WHERE o.id = i.source_id))
 """
-"""Living bursts of observations that a correction after a change put elsewhere, as bursts of their own."""
+"""Living bursts of observations that a correction after a change put elsewhere, as bursts of their own. The corrections are few, and come
+first by `CROSS JOIN`; an imported copy has no observation."""
 
 
 def undo(connection: Connection, entry: AuditEntry, actor: str | None) -> str:
     """Takes one change back and returns the id of the entry that says so.
 
     Raises Conflict where it is undone already, too long ago, of a kind that cannot be undone, or changed again since; also where it would
-    bring back a burst whose observation was corrected since, which would be a member of two categories then.
+    bring back a burst whose observation was corrected since: to where a person said that it is not, or to two categories at once.
     """
     if not entry.undoable:
         raise Conflict(f"change {entry.id!r} cannot be undone: {_why_not(connection, entry)}")

@@ -18,7 +18,7 @@ from rich.text import Text
 from clients.cli.service import bound, read_settings, url_of
 from clients.cli.terminal import Json, console, errors, print_json, print_table
 from clients.errors import ClientError
-from core.errors import OneLookError
+from core.errors import InvalidInput, OneLookError
 
 if TYPE_CHECKING:
     from service.settings import Settings
@@ -222,7 +222,7 @@ def port(settings: Settings) -> Finding:
     try:
         with RobotClient(url, timeout_s=PROBE_S, retry=Retry(attempts=1)) as robot:
             return Finding("port", State.good, f"{url}: OneLook {robot.info().version} answers")
-    except ClientError:
+    except (ClientError, InvalidInput):
         remedy = "stop what uses it, or choose another one with ONELOOK_PORT or --port (0 takes a free one)"
         return Finding("port", State.bad, f"{url}: {refused}", remedy)
 

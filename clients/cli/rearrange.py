@@ -42,7 +42,9 @@ def rearrange(
     settings: dict[str, object] = {"categories": categories, "trials": trials, "views": views, "seed": seed}
     lines, picture = out / "rearrange.jsonl", out / "rearrange.png"
     done = [Trial(**jsonlib.loads(line)) for line in interrupted(lines, settings)] if resume else []
-    earlier = drawn_before(picture) if resume else []
+    if not resume:
+        picture.unlink(missing_ok=True)  # of another batch
+    earlier = drawn_before(picture)
     with service(url, out, fresh=not resume) as address, RobotClient(address) as robot:
         batch = Rearrangement(robot, categories, trials, views, seed, done=len(done))
         with screen.status(f"{len(done) + 1} of {trials}") as status:

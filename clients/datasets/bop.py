@@ -120,7 +120,7 @@ def _sequence(scene: Path, instance: str, number: int, sights: list[Sight], mode
 def _camera(entry: Mapping[str, Any], camera_from_model: FloatArray, within: str) -> Camera:
     if "cam_R_w2c" in entry:
         return folders.read_camera(entry, within)
-    return Camera(folders.read_numbers(entry, "cam_K", (3, 3), within), np.linalg.inv(camera_from_model))
+    return folders.camera_of(folders.read_numbers(entry, "cam_K", (3, 3), within), np.linalg.inv(camera_from_model), within)
 
 
 def _camera_from_model(scene: Path, sight: Sight, truth: Mapping[str, Any]) -> FloatArray:

@@ -156,7 +156,15 @@ def read_camera(entry: Mapping[str, Any], within: str) -> Camera:
     world_from_camera = np.eye(4)
     world_from_camera[:3, :3] = rotation.T
     world_from_camera[:3, 3] = -rotation.T @ read_numbers(entry, "cam_t_w2c", (3,), within) / 1000
-    return Camera(read_numbers(entry, "cam_K", (3, 3), within), world_from_camera)
+    return camera_of(read_numbers(entry, "cam_K", (3, 3), within), world_from_camera, within)
+
+
+def camera_of(K: FloatArray, world_from_camera: FloatArray, within: str) -> Camera:
+    """Of shapes (3, 3) and (4, 4). Raises InvalidInput, naming it after `within`, where it is none."""
+    try:
+        return Camera(K, world_from_camera)
+    except InvalidInput as error:
+        raise InvalidInput(f"{within}{error.field}", error.message) from None
 
 
 def read_numbers(entry: Mapping[str, Any], name: str, shape: tuple[int, ...], within: str) -> FloatArray:

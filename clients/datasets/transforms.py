@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from clients.datasets import folders
 from clients.datasets.images import SUFFIXES, read_mask, read_rgba, read_units
 from core.errors import InvalidInput
-from core.views import Camera, FloatArray, View
+from core.views import FloatArray, View
 
 FILES = ("transforms.json", "transforms_train.json")
 """The first that is there."""
@@ -100,7 +100,7 @@ def _view(folder: Path, image: Path, frame: Mapping[str, Any], masks: bool, with
     given = frame.get("transform_matrix")
     rows = 3 if isinstance(given, list) and len(given) == 3 else 4  # some leave out the last
     pose[:3] = folders.read_numbers(frame, "transform_matrix", (rows, 4), within)[:3]
-    return View(rgb, depth_m, Camera(K, pose @ AXES), mask if masks and mask is not None and mask.any() else None)
+    return View(rgb, depth_m, folders.camera_of(K, pose @ AXES, within), mask if masks and mask is not None and mask.any() else None)
 
 
 def _intrinsics(frame: Mapping[str, Any], size: tuple[int, int], within: str) -> tuple[FloatArray, tuple[float, ...]]:
@@ -113,6 +113,8 @@ def _intrinsics(frame: Mapping[str, Any], size: tuple[int, int], within: str) ->
     if model not in PINHOLES:
         raise InvalidInput(f"{within}camera_model", f"expected one of {', '.join(sorted(PINHOLES))}, found {model!r}; undistort the images")
     height, width = size
+    if "w" in frame and given("w") <= 0:
+        raise InvalidInput(f"{within}w", f"expected a width in pixels, found {frame['w']!r:.80}")
     scale = width / given("w") if "w" in frame else 1.0
     if "fl_x" in frame:
         fx = scale * given("fl_x")
@@ -136,6 +138,9 @@ def _depth(folder: Path, frame: Mapping[str, Any], size: tuple[int, int], within
     name = _depth_name(frame)
     if name is None:
         return None
+    if not isinstance(name, str):
+        field = "depth_file_path" if "depth_file_path" in frame else "depth_path"
+        raise InvalidInput(f"{within}{field}", f"expected the name of a file, found {name!r:.80}")
     unit = "depth_unit_scale_factor" if "depth_file_path" in frame else "integer_depth_scale"
     if unit in frame:
         unit_m = float(folders.read_numbers(frame, unit, (), within))
@@ -151,8 +156,8 @@ def _depth(folder: Path, frame: Mapping[str, Any], size: tuple[int, int], within
 
 def _array(path: Path) -> NDArray[Any]:
     try:
-        return np.asarray(np.load(path, allow_pickle=False))
-    except (OSError, ValueError) as error:
+        return np.asarray(np.load(path, allow_pickle=False), dtype=float)
+    except (OSError, TypeError, ValueError) as error:
         raise InvalidInput(str(path), f"cannot be read as numpy's array of depth ({error})") from None
 
 

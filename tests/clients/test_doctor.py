@@ -151,6 +151,13 @@ def test_an_address_of_ipv6_may_be_taken_too(monkeypatch: pytest.MonkeyPatch) ->
     assert (found.state, found.found) == (State.bad, "http://[::1]:9: Address already in use")
 
 
+def test_what_is_no_name_of_a_host_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(doctor, "PROBE_S", 0.1)
+    found = doctor.port(Settings(host="a..b", port=9))
+    assert found.state is State.bad
+    assert found.found.startswith("http://a..b:9: ")
+
+
 def test_the_service_itself_on_its_port(url: str) -> None:
     found = doctor.port(Settings(port=int(url.rpartition(":")[2])))
     assert found.state is State.good

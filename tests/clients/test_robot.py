@@ -162,7 +162,9 @@ def test_a_page_or_a_redirection_is_no_answer(answer: httpx.Response, said: str)
             ask()
 
 
-@pytest.mark.parametrize("url", ["127.0.0.1:8000", "localhost:8000", "http://robot:port", "http://::1:8000", "ftp://robot", "http://", ""])
+@pytest.mark.parametrize(
+    "url", ["127.0.0.1:8000", "localhost:8000", "http://robot:port", "http://::1:8000", "ftp://robot", "http://a..b", "http://", ""]
+)
 @pytest.mark.parametrize("client", [RobotClient, AsyncRobotClient])
 def test_what_is_no_address_is_said_at_once(client: type, url: str) -> None:
     with pytest.raises(InvalidInput, match=r"^url: expected an address such as http://127\.0\.0\.1:8000 .*found '"):

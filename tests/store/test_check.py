@@ -13,6 +13,7 @@ from core.reference import Reference
 from core.scan import ScanRequest
 from core.views import Burst
 from store import backup as backups
+from store.connection import DATABASE
 from store.memory import Memory
 from store.records import Category
 
@@ -219,6 +220,17 @@ def test_a_backup_that_cannot_be_written_leaves_nothing(full: Memory, tmp_path: 
     with pytest.raises(Unavailable, match="choose another folder"):
         full.backup(tmp_path / "file" / "a")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["file", "memory"]
+
+
+def test_a_backup_of_a_damaged_database_says_so(full: Memory, tmp_path: Path) -> None:
+    (page,) = next(iter(full._connection.rows("SELECT rootpage FROM sqlite_master WHERE name = 'categories'"))).values()
+    (size,) = next(iter(full._connection.rows("PRAGMA page_size"))).values()
+    list(full._connection.rows("PRAGMA wal_checkpoint(TRUNCATE)"))
+    with (full.folder / DATABASE).open("r+b") as file:
+        file.seek((page - 1) * size)
+        file.write(bytes(range(256)) * (size // 256))
+    with pytest.raises(Unavailable, match="is damaged: .*; restore it from a backup$"):
+        full.backup(tmp_path / "a")
 
 
 def test_a_backup_on_a_full_disk_is_told_with_the_remedy_and_leaves_nothing(full: Memory, tmp_path: Path) -> None:

@@ -256,3 +256,20 @@ def test_what_was_imported_again_is_no_reason_to_keep_a_deletion(
     memory.corrections.to_category(assigned.id, other.id, encoded)
     memory.undo(renamed.id)
     assert [each.name for each in memory.categories.all()] == ["cup", "mug", "cup"]
+
+
+def test_an_imported_copy_comes_back_though_the_burst_itself_was_corrected_since(
+    memory: Memory, category: Category, other: Category, assigned: Observation, encoded, tmp_path
+) -> None:
+    memory.require_backbone("colour", "fingerprint-a")
+    path = memory.export(tmp_path / "cup.zip", [category.id]).path
+    memory.categories.delete(category.id)
+    first = last(memory)
+    memory.import_archive(path)
+    (copy,) = (each.id for each in memory.categories.all() if each.name == "cup")
+    memory.undo(first.id)
+    memory.categories.delete(copy)
+    second = last(memory)
+    memory.corrections.to_category(assigned.id, other.id, encoded)
+    memory.undo(second.id)
+    assert [each.name for each in memory.categories.all()].count("cup") == 2

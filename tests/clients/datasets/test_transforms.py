@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,13 @@ from core.errors import InvalidInput
 OPENGL = np.diag([1.0, -1.0, -1.0, 1.0])
 INTRINSICS = {"w": 64, "h": 48, "fl_x": 70.0, "fl_y": 72.0, "cx": 31.0, "cy": 26.0}
 """The shots' K; its principal point (30.5, 25.5) counts from the first pixel's centre, these from the image's corner."""
+
+
+def npy(array: np.ndarray) -> bytes:
+    """As numpy's file."""
+    file = BytesIO()
+    np.save(file, array)
+    return file.getvalue()
 
 
 def write(
@@ -153,6 +161,14 @@ def test_what_is_missing_is_named(tmp_path: Path, shots: list[Any]) -> None:
         (lambda frame: frame.update(fl_x="wide"), "frames[2].fl_x", "expected a number, found 'wide'"),
         (lambda frame: frame.pop("file_path"), "frames[2].file_path", "expected the name of an image"),
         (lambda frame: frame.update(file_path="images/-.png"), "frames[2].file_path", "is no file"),
+        (lambda frame: frame.update(w=0), "frames[2].w", "expected a width in pixels, found 0"),
+        (lambda frame: frame.update(depth_file_path=3), "frames[2].depth_file_path", "expected the name of a file, found 3"),
+        (lambda frame: frame.update(fl_x=0), "frames[2].camera.K", "expected"),
+        (
+            lambda frame: frame.update(transform_matrix=[[2, 0, 0, 0], *np.eye(4)[1:].tolist()]),
+            "frames[2].camera.world_from_camera",
+            "rotation",
+        ),
     ],
 )
 def test_what_is_wrong_with_a_frame_is_named_by_its_place_in_the_file(
@@ -174,7 +190,7 @@ def test_a_pose_may_leave_out_its_last_row(tmp_path: Path, shots: list[Any], pro
     prove(transforms.find_sequences(tmp_path / "a")[0], depth=False, mask=False)
 
 
-@pytest.mark.parametrize("content", [None, b"no array"])
+@pytest.mark.parametrize("content", [None, b"no array", npy(np.array(["far"]))])
 def test_an_array_of_depth_that_cannot_be_read_is_named(tmp_path: Path, shots: list[Any], content: bytes | None) -> None:
     write(tmp_path / "a", shots, INTRINSICS, lambda n, shot: {"depth_file_path": "depth.npy"})
     if content is not None:
