@@ -33,7 +33,7 @@ def memory(*words: object) -> Result:
 def answered(*words: object) -> dict:
     done = memory(*words, "--json")
     assert done.exit_code == 0, done.output
-    return json.loads(done.output)
+    return json.loads(done.stdout)
 
 
 def test_what_is_there_is_told(data_dir: Path) -> None:
