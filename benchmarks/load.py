@@ -71,10 +71,9 @@ def run(
 
     The service is that of `taught_service`; raises InvalidInput for one on another machine, or for more views than were recorded.
     """
-    sequences = find_sequences(data_or_samples(data))
-    require_views(sequences, [ViewCounts.parse(str(views))])
+    sequences, bursts = recorded(data, views)
     with taught_service(url, sequences, {}) as address:
-        errand = observing([folders.load_burst(each, range(views)) for each in sequences])
+        errand = observing(bursts)
         rows = [load_row(count, seconds, record) for count, record in _levels(address, robots, seconds, errand, seed)]
     meta = {"benchmark": "load", "seconds": seconds, "views": views, "seed": seed}
     report(f"Load, {views} views an observation, {seconds:.0f} s each", rows, meta, json)
@@ -133,6 +132,13 @@ def taught_service(url: str | None, sequences: Sequence[folders.Sequence], setti
         require_loopback(url)
         teach(url, sequences)
         yield url
+
+
+def recorded(data: Path | None, views: int) -> tuple[list[folders.Sequence], list[Burst]]:
+    """The sequences of `data`, the samples where None, and the first views of each. Raises InvalidInput for more than were recorded."""
+    sequences = find_sequences(data_or_samples(data))
+    require_views(sequences, [ViewCounts.parse(str(views))])
+    return sequences, [folders.load_burst(each, range(views)) for each in sequences]
 
 
 def teach(url: str, sequences: Sequence[folders.Sequence]) -> None:

@@ -10,15 +10,11 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.crowd import FATES, Errand, Record, Sample, crowd
-from benchmarks.load import taught_service
+from benchmarks.load import recorded, taught_service
 from benchmarks.load_plot import plot_soak
-from benchmarks.pairs import ViewCounts, require_views
 from benchmarks.parallel import bar
 from benchmarks.tables import print_table, write_json
 from clients.asynchronous import AsyncRobotClient
-from clients.datasets import folders
-from clients.datasets.samples import data_or_samples
-from clients.datasets.sources import find_sequences
 from core.errors import InvalidInput
 from core.views import Burst
 
@@ -67,11 +63,9 @@ def run(
 
     The service is that of `load.taught_service`.
     """
-    sequences = find_sequences(data_or_samples(data))
-    require_views(sequences, [ViewCounts.parse(str(views))])
+    sequences, bursts = recorded(data, views)
     with taught_service(url, sequences, SETTINGS) as address:
-        errand = living([folders.load_burst(each, range(views)) for each in sequences])
-        record = _soak(address, robots, 60 * minutes, errand, seed)
+        record = _soak(address, robots, 60 * minutes, living(bursts), seed)
     result = soak_result(minutes, robots, record)
     if json is not None:
         write_json(json, {"benchmark": "soak", "seed": seed, **asdict(result)}, [asdict(sample) for sample in record.samples])

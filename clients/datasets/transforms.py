@@ -46,7 +46,7 @@ class TransformsReader(folders.Reader):
 
     def files(self, sequence: folders.Sequence) -> list[Path]:
         """See `folders.Reader`."""
-        depths = [_depth_name(frame) for _, frame in _frames(folders.read_json(self.file), self.file)]
+        depths = [_depth_name(frame, within) for within, frame in _frames(folders.read_json(self.file), self.file)]
         return [*sequence.images, *(sequence.path / name for name in depths if name), self.file]
 
 
@@ -113,9 +113,10 @@ def _intrinsics(frame: Mapping[str, Any], size: tuple[int, int], within: str) ->
     if model not in PINHOLES:
         raise InvalidInput(f"{within}camera_model", f"expected one of {', '.join(sorted(PINHOLES))}, found {model!r}; undistort the images")
     height, width = size
-    if "w" in frame and given("w") <= 0:
-        raise InvalidInput(f"{within}w", f"expected a width in pixels, found {frame['w']!r:.80}")
-    scale = width / given("w") if "w" in frame else 1.0
+    calibrated = given("w") if "w" in frame else width
+    if calibrated <= 0:
+        raise InvalidInput(f"{within}w", f"expected a width in pixels, found {calibrated:g}")
+    scale = width / calibrated
     if "fl_x" in frame:
         fx = scale * given("fl_x")
     elif "camera_angle_x" in frame:
@@ -129,18 +130,19 @@ def _intrinsics(frame: Mapping[str, Any], size: tuple[int, int], within: str) ->
     return K, tuple(given(name) if name in frame else 0.0 for name in DISTORTION)
 
 
-def _depth_name(frame: Mapping[str, Any]) -> str | None:
-    return frame.get("depth_file_path") or frame.get("depth_path")
+def _depth_name(frame: Mapping[str, Any], within: str) -> str | None:
+    name = frame.get("depth_file_path") or frame.get("depth_path")
+    if name is not None and not isinstance(name, str):
+        field = "depth_file_path" if "depth_file_path" in frame else "depth_path"
+        raise InvalidInput(f"{within}{field}", f"expected the name of a file, found {name!r:.80}")
+    return name
 
 
 def _depth(folder: Path, frame: Mapping[str, Any], size: tuple[int, int], within: str) -> NDArray[np.float32] | None:
     """In the image's size (H, W): nerfstudio's `depth_file_path`, or Instant-NGP's `depth_path` with `integer_depth_scale`."""
-    name = _depth_name(frame)
+    name = _depth_name(frame, within)
     if name is None:
         return None
-    if not isinstance(name, str):
-        field = "depth_file_path" if "depth_file_path" in frame else "depth_path"
-        raise InvalidInput(f"{within}{field}", f"expected the name of a file, found {name!r:.80}")
     unit = "depth_unit_scale_factor" if "depth_file_path" in frame else "integer_depth_scale"
     if unit in frame:
         unit_m = float(folders.read_numbers(frame, unit, (), within))

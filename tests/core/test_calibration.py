@@ -23,9 +23,8 @@ def test_few_samples_leave_the_prior_and_are_more_careful() -> None:
     none, some = Calibration.fit([], PRIOR), Calibration.fit([0.1] * 5, PRIOR)
     assert none.location == pytest.approx(np.median(PRIOR.rivals))
     assert 0.1 <= some.location < none.location
-    predicted = t.ppf(0.99, PRIOR_SAMPLES - 1) * np.sqrt(
-        1 + 1 / PRIOR_SAMPLES
-    )  # of one more from a normal distribution of which so many are known
+    # Of one more from a normal distribution of which so many are known.
+    predicted = t.ppf(0.99, PRIOR_SAMPLES - 1) * np.sqrt(1 + 1 / PRIOR_SAMPLES)
     assert none.threshold(0.01) == pytest.approx(none.location + predicted * none.spread)
 
 

@@ -184,6 +184,13 @@ def test_what_is_wrong_with_a_frame_is_named_by_its_place_in_the_file(
     assert caught.value.field == f"{file}: {field}"
 
 
+def test_the_files_of_a_sequence_need_depth_that_has_a_name(tmp_path: Path, shots: list[Any]) -> None:
+    write(tmp_path / "a", shots, INTRINSICS, lambda n, shot: {"depth_path": 3})
+    (sequence,) = transforms.find_sequences(tmp_path / "a")
+    with pytest.raises(InvalidInput, match="expected the name of a file, found 3"):
+        sequence.reader.files(sequence)
+
+
 def test_a_pose_may_leave_out_its_last_row(tmp_path: Path, shots: list[Any], prove: Callable[..., None]) -> None:
     rows = [(shot.camera.world_from_camera @ OPENGL)[:3].tolist() for shot in shots]
     write(tmp_path / "a", shots, INTRINSICS, lambda n, shot: {"transform_matrix": rows[n]})
