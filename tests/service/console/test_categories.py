@@ -112,6 +112,7 @@ def test_a_category_whose_reference_is_damaged_says_so_and_can_be_deleted(client
     assert re.search(r'role="alert">\s*<strong>Its reference is damaged</strong>\s*<p>[^<]*reference.npz', page.text)
     assert set(re.findall(r"/views/\d/(\w+).png", page.text)) == {"rgb"}
     assert "data-scene" not in page.text
+    assert 'class="health' not in page.text
     assert len(re.findall('type="checkbox"', page.text)) == 2
     assert f'href="/categories/{cup}/delete"' in page.text
     assert client.get(f"/categories/{cup}/delete").status_code == 200
