@@ -75,14 +75,19 @@ def contender(name: str, options: PoseOptions, token_size: int) -> Contender:
         _refuse(name, options, "dims", "method", "consensus_deg")
         chosen = {key: value for key, value in asdict(options).items() if value is not None}
         orientation = OrientationConfig(**chosen)
-        return _Orientation(orientation, component_count(orientation.dims, token_size) or token_size)
+        return _Orientation(orientation, _described(orientation.dims, token_size))
     if name in METHODS:
         _refuse(name, options)
         return _Registration(name)
     if name not in VARIANTS:
         raise InvalidInput("variant", f"{name!r} is none of {', '.join(NAMES)}")
     config = PoseConfig.named(name, options)
-    return _Pipeline(config, component_count(config.dims, token_size) or token_size)
+    return _Pipeline(config, _described(config.dims, token_size))
+
+
+def _described(dims: int | None, token_size: int) -> int:
+    """Components that describe a patch: a small token has fewer than are asked for. Raises as `component_count` does."""
+    return min(component_count(dims, token_size) or token_size, token_size)
 
 
 @dataclass(frozen=True)

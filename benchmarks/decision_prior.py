@@ -59,9 +59,9 @@ def write(out: Path, fingerprint: str, labels: NDArray[np.intp], match: FloatArr
     usual = Usual(round(float(others.mean()), 4), round(float(others.std()), 4))
     wrong: list[list[tuple[float, float]]] = []
     own: list[tuple[float, float]] = []
-    for burst in range(len(labels)):
-        found = {each: _evidence(match, labels, burst, each, usual) for each in set(labels.tolist()) if _others(labels, burst, each)}
-        by_pose = {each: agreement[_others(labels, burst, each)[0], burst] for each in found}
+    for burst, oldest in enumerate(founders):
+        found = {each: _evidence(match, labels, oldest, burst, each, usual) for each in oldest}
+        by_pose = {each: agreement[founder, burst] for each, founder in oldest.items()}
         wrong.append([(found[each], by_pose[each]) for each in found if each != labels[burst]])
         own += [(found[each], by_pose[each]) for each in found if each == labels[burst]]
     tokens, poses = (np.array([pair[part] for pairs in wrong for pair in pairs]) for part in (0, 1))
@@ -82,9 +82,9 @@ def write(out: Path, fingerprint: str, labels: NDArray[np.intp], match: FloatArr
     return out
 
 
-def _evidence(match: FloatArray, labels: NDArray[np.intp], burst: int, category: int, usual: Usual) -> float:
+def _evidence(match: FloatArray, labels: NDArray[np.intp], founders: dict[int, int], burst: int, category: int, usual: Usual) -> float:
     """Evidence of a burst for a category, all other bursts being in the memory, but of its own category only if that is asked about."""
-    own, founders = labels[burst], _founders(labels, burst)
+    own = labels[burst]
 
     def cohort(each: int) -> dict[str, float]:
         return {str(other): float(match[founder, each]) for other, founder in founders.items()}

@@ -130,7 +130,8 @@ def taught_service(url: str | None, sequences: Sequence[folders.Sequence], setti
             folder = Path(open_.enter_context(TemporaryDirectory()))
             url = open_.enter_context(local_service(folder / "memory", folder / "log", settings))
         require_loopback(url)
-        teach(url, sequences)
+        for group in list(folders.by_category(list(sequences)).values())[:LEARNT]:
+            teach(url, group[0], TAUGHT_VIEWS)
         yield url
 
 
@@ -141,16 +142,14 @@ def recorded(data: Path | None, views: int) -> tuple[list[folders.Sequence], lis
     return sequences, [folders.load_burst(each, range(views)) for each in sequences]
 
 
-def teach(url: str, sequences: Sequence[folders.Sequence]) -> None:
-    """Makes a category of each of the first objects of different kinds."""
-    firsts = [group[0] for group in folders.by_category(list(sequences)).values()][:LEARNT]
+def teach(url: str, sequence: folders.Sequence, most_views: int | None = None) -> str:
+    """Makes a category of an object, of its first views where they are limited; returns the category's id."""
+    burst = folders.load_burst(sequence, range(len(sequence.images))[:most_views])
     with RobotClient(url) as robot:
-        for sequence in firsts:
-            burst = folders.load_burst(sequence, range(min(TAUGHT_VIEWS, len(sequence.images))))
-            scan = robot.scan(burst)
-            for view in burst.views:
-                scan.add(view)
-            scan.complete(sequence.category)
+        scan = robot.scan(burst)
+        for view in burst.views:
+            scan.add(view)
+        return scan.complete(sequence.category).id
 
 
 def observing(bursts: Sequence[Burst]) -> Errand:

@@ -19,13 +19,14 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from websockets.asyncio.client import ClientConnection, connect
 
+from benchmarks.load import teach
 from benchmarks.parallel import bar
 from benchmarks.tables import report
 from clients.datasets import folders
 from clients.datasets.samples import data_or_samples
 from clients.datasets.sources import find_sequences
 from clients.errors import problem_from_json
-from clients.robot import RobotClient
+from clients.exchange import connection_to
 from clients.tracking import MAX_MESSAGE_BYTES, Conversation, websocket_url
 from core.errors import InvalidInput
 from core.views import View
@@ -106,7 +107,7 @@ def run(serve: Serve, json: Path | None, *, grids: Sequence[int], rate_hz: float
     with bar() as progress:
         for grid, warm in progress.track(list(itertools.product(grids, (True, False))), description="tracking"):
             with TemporaryDirectory() as folder, serve(Path(folder) / "memory", grid, warm) as url:
-                category_id = _teach(url, taught)
+                category_id = teach(url, taught)
                 stream = asyncio.run(_follow(url, category_id, frames, rate_hz, seconds))
             rows.append(stream.row(grid * PATCH_PX, warm))
     meta = {"benchmark": "track", "rate_hz": rate_hz, "seconds": seconds}
@@ -121,34 +122,30 @@ def _two_of_a_kind(data: Path) -> list[folders.Sequence]:
     raise InvalidInput("--data", f"no category below {data} has two objects: one teaches it, the other is followed")
 
 
-def _teach(url: str, sequence: folders.Sequence) -> str:
-    with RobotClient(url) as robot:
-        burst = folders.load_burst(sequence)
-        scan = robot.scan(burst)
-        for view in burst.views:
-            scan.add(view)
-        return scan.complete(sequence.category).id
-
-
 async def _follow(url: str, category_id: str, frames: Sequence[View], rate_hz: float, seconds: float) -> Stream:
+    with connection_to(url):
+        async with connect(websocket_url(url), max_size=MAX_MESSAGE_BYTES) as socket:
+            return await _stream(socket, category_id, frames, rate_hz, seconds)
+
+
+async def _stream(socket: ClientConnection, category_id: str, frames: Sequence[View], rate_hz: float, seconds: float) -> Stream:
     turns = itertools.cycle([*frames, *frames[-2:0:-1]])
     talk, stream = Conversation(), Stream()
-    async with connect(websocket_url(url), max_size=MAX_MESSAGE_BYTES) as socket:
-        await socket.send(talk.hello(category_id=category_id))
-        for number, view in zip(range(WARM_UP), turns):
-            await socket.send(talk.frame(view, number / rate_hz))
-            while talk.read(await socket.recv()) is None:
-                pass
-        times = range(WARM_UP, WARM_UP + round(rate_hz * seconds))
-        messages = [(number, talk.frame(view, number / rate_hz)) for number, view in zip(times, turns)]
-        listening = asyncio.create_task(_listen(socket, stream))
-        await _send(socket, messages, rate_hz, stream)
-        end = time.monotonic() + LATE_S
-        while not (stream.over or listening.done()) and time.monotonic() < end:
-            await asyncio.sleep(0.05)
-        if listening.done():
-            listening.result()  # raises what it was told of
-        listening.cancel()
+    await socket.send(talk.hello(category_id=category_id))
+    for number, view in zip(range(WARM_UP), turns):
+        await socket.send(talk.frame(view, number / rate_hz))
+        while talk.read(await socket.recv()) is None:
+            pass
+    times = range(WARM_UP, WARM_UP + round(rate_hz * seconds))
+    messages = [(number, talk.frame(view, number / rate_hz)) for number, view in zip(times, turns)]
+    listening = asyncio.create_task(_listen(socket, stream))
+    await _send(socket, messages, rate_hz, stream)
+    end = time.monotonic() + LATE_S
+    while not (stream.over or listening.done()) and time.monotonic() < end:
+        await asyncio.sleep(0.05)
+    if listening.done():
+        listening.result()  # raises what it was told of
+    listening.cancel()
     return stream
 
 

@@ -16,7 +16,8 @@ from store.instances import LIVING, insert_instance, is_empty
 from store.observations import require_living
 from store.records import AuditEntry
 
-ASSIGNED = f"SELECT i.id, i.category_id, i.how, i.similarity {LIVING} AND i.source = 'observation' AND i.source_id = ?"
+ASSIGNED = f"SELECT i.id, i.category_id, i.how, i.similarity {LIVING} AND i.source_id = ? AND i.observation_id IS NOT NULL"
+"""The burst of an observation. Imported copies of it have its `source_id` too, but no observation."""
 
 
 class Corrections:

@@ -118,7 +118,7 @@ def summary_rows(summary: Summary) -> list[tuple[str, str, str]]:
         rows.append(("time to a category", f"{summary.scan_ms / 1e3:.1f} s", "median, from the scan's first view"))
     if summary.motion_s:
         rows.append(("arm in motion", f"{summary.motion_s / 60:.1f} min", f"simulated; {summary.refused} viewpoints were out of reach"))
-    rows.append(("whole episode", f"{summary.total_s:.0f} s", ""))
+    rows.append(("this run", f"{summary.total_s:.0f} s", ""))
     return rows
 
 

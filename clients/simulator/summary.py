@@ -60,6 +60,7 @@ class Summary:
     motion_s: float
     """Simulated time that arms moved, all together."""
     total_s: float
+    """Of this run; not of an earlier one that it continues."""
     waypoints: Spread | None = None
     """None where no object was looked at from any."""
     disagreements: tuple[str, ...] = ()

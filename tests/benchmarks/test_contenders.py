@@ -32,6 +32,11 @@ def test_every_contender_has_a_name_and_travels_between_processes(name: str) -> 
     assert pickle.loads(pickle.dumps(found)) == found
 
 
+@pytest.mark.parametrize(("token_size", "dims"), [(384, 32), (8, 8)])
+def test_a_row_tells_of_no_more_components_than_a_token_has(token_size: int, dims: int) -> None:
+    assert contender("best", PoseOptions(dims=32), token_size).dims == dims
+
+
 @pytest.mark.parametrize("name", ["pnp", "essential"])
 def test_without_depth_the_rotation_is_found_and_scale_only_where_it_can_be(name: str, eggs: list) -> None:
     (large, reference_from_model), (small, target_from_model) = eggs

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 import shutil
+from collections.abc import Awaitable, Callable
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,7 @@ from websockets.asyncio.server import ServerConnection, serve
 from benchmarks import track
 from benchmarks.track import Stream
 from clients.datasets.folders import find_sequences, load_burst
-from clients.errors import PROBLEM_URN, UnavailableProblem
+from clients.errors import PROBLEM_URN, UnavailableProblem, Unreachable
 from core.errors import InvalidInput
 
 
@@ -51,26 +52,43 @@ def test_a_service_that_answers_nothing_has_a_row_too() -> None:
     assert np.isnan([row.p50_ms, row.posed]).all()
 
 
-def test_a_problem_is_no_late_answer(recorded: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    problem = {"type": f"{PROBLEM_URN}unavailable", "status": 503, "title": "Busy", "detail": "all lanes are taken"}
+def follow(recorded: Path, then: Callable[[ServerConnection], Awaitable[None]]) -> Stream:
+    """What becomes of frames where the service answers while it warms up, and `then` does this."""
 
     async def answer(socket: ServerConnection) -> None:
         for number in range(track.WARM_UP + 1):  # the greeting and the first frames
             message = json.loads(await socket.recv())
             await socket.send(WELCOME if number == 0 else answered(message["id"]))
         await socket.recv()
-        await socket.send(json.dumps({"type": "problem", "problem": problem}))
-        await socket.wait_closed()
+        await then(socket)
 
-    async def follow() -> Stream:
+    async def stream() -> Stream:
         async with serve(answer, "127.0.0.1", 0, max_size=None) as server:
             port = server.sockets[0].getsockname()[1]
             frames = load_burst(find_sequences(recorded)[0]).views
             return await track._follow(f"http://127.0.0.1:{port}", "c", frames, 50, 0.2)
 
+    return asyncio.run(stream())
+
+
+def test_a_problem_is_no_late_answer(recorded: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    problem = {"type": f"{PROBLEM_URN}unavailable", "status": 503, "title": "Busy", "detail": "all lanes are taken"}
+
+    async def tell(socket: ServerConnection) -> None:
+        await socket.send(json.dumps({"type": "problem", "problem": problem}))
+        await socket.wait_closed()
+
     monkeypatch.setattr(track, "LATE_S", 1.0)
     with pytest.raises(UnavailableProblem, match="all lanes are taken"):
-        asyncio.run(follow())
+        follow(recorded, tell)
+
+
+def test_a_service_that_goes_down_is_unreachable(recorded: Path) -> None:
+    async def die(socket: ServerConnection) -> None:
+        socket.transport.abort()
+
+    with pytest.raises(Unreachable, match="no connection to http://127.0.0.1"):
+        follow(recorded, die)
 
 
 def test_a_kind_of_one_object_has_nothing_to_follow(recorded: Path) -> None:

@@ -273,3 +273,17 @@ def test_an_imported_copy_comes_back_though_the_burst_itself_was_corrected_since
     memory.corrections.to_category(assigned.id, other.id, encoded)
     memory.undo(second.id)
     assert [each.name for each in memory.categories.all()].count("cup") == 2
+
+
+def test_correcting_leaves_an_imported_copy_where_it_is(
+    memory: Memory, category: Category, other: Category, assigned: Observation, encoded, tmp_path
+) -> None:
+    memory.require_backbone("colour", "fingerprint-a")
+    path = memory.export(tmp_path / "cup.zip", [category.id]).path
+    memory.categories.delete(category.id)
+    memory.import_archive(path)
+    memory.corrections.to_category(assigned.id, other.id, encoded)
+    assert {each.name: memory.instances.of(each.id)[-1].source_id for each in memory.categories.all()} == {
+        "mug": assigned.id,
+        "cup": assigned.id,
+    }
