@@ -31,7 +31,7 @@ from core import quality
 from core.errors import InvalidInput
 from store.memory import Memory
 
-from .conftest import CentreBackbone
+from ..conftest import CentreBackbone
 
 
 def onelook(*words: object) -> Result:

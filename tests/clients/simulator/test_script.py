@@ -35,7 +35,7 @@ def test_a_script_says_what_is_met_in_which_order(tmp_path: Path) -> None:
 
 
 def test_the_documented_script_is_one(tmp_path: Path) -> None:
-    page = (Path(__file__).parents[2] / "docs" / "simulator.md").read_text()
+    page = (Path(__file__).parents[3] / "docs" / "simulator.md").read_text()
     (block,) = re.findall(r"```yaml\n(.*?)```", page, re.DOTALL)
     file = tmp_path / "episode.yaml"
     file.write_text("\n".join(line for line in block.splitlines() if "FOLDER" not in line))

@@ -22,7 +22,7 @@ from store.memory import Memory
 @pytest.fixture
 def data_dir(tmp_path: Path) -> Path:
     """A memory of one category, called cup."""
-    shutil.unpack_archive(Path(__file__).parents[1] / "data" / "memory_m001.zip", tmp_path / "memory")
+    shutil.unpack_archive(Path(__file__).parents[2] / "data" / "memory_m001.zip", tmp_path / "memory")
     return tmp_path / "memory"
 
 

@@ -13,7 +13,8 @@ from clients.simulator.raycast.world import UP, RaycastWorld, standing
 from core.camera_poses import look_at
 from core.views import FloatArray, View
 
-BOX_M = np.array([0.2, 0.12, 0.1])
+from ..conftest import BOX_M
+
 ABOVE = look_at(np.array([0.001, 0.0, 0.6]), np.zeros(3), UP)
 ASIDE = look_at(np.array([0.5, 0.1, 0.35]), np.array([0.0, 0.0, 0.05]), UP)
 
