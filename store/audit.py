@@ -31,8 +31,9 @@ class Audit:
 
     def of(self, category_id: str, limit: int) -> list[AuditEntry]:
         """The latest changes of a category, newest first, also those that it gave bursts to or took them from."""
-        mine = "category_id = ?1 OR json_extract(after, '$.into') = ?1 OR json_extract(after, '$.category') = ?1"
-        query = f"SELECT * FROM audit WHERE {mine} ORDER BY rowid DESC LIMIT ?2"
+        others = ("after, '$.into'", "after, '$.category'", "before, '$.assigned.category_id'")
+        mine = " OR ".join(f"json_extract({other}) = ?1" for other in others)
+        query = f"SELECT * FROM audit WHERE category_id = ?1 OR {mine} ORDER BY rowid DESC LIMIT ?2"
         return [self._entry(row) for row in self._connection.rows(query, category_id, limit)]
 
     def get(self, entry_id: str) -> AuditEntry:

@@ -102,4 +102,5 @@ def _of_file(connection: Connection, table: str, row: Row, name: str, wrong: str
         consequence = "its pictures; nothing that was learnt, unless another backbone should compute it anew"
     else:
         consequence = "this scan cannot become a category; delete it and begin another"
-    return Damage(kind, row["id"], called, f"{row['folder']}/{name}", wrong, consequence)
+    whose = row["folder"].split("/")[1]  # of views in a scan the scan's, which their own rows are below
+    return Damage(kind, whose, called, f"{row['folder']}/{name}", wrong, consequence)

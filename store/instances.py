@@ -80,11 +80,11 @@ class Instances:
 
     def forget(self, category_id: str, instance_id: str, *, actor: str | None = None) -> None:
         """Takes one out of a category. Raises NotFound, and Conflict for a category's last."""
-        if self.get(instance_id).category_id != category_id:
-            raise NotFound(f"category {category_id!r} has no instance {instance_id!r}")
         with self._connection.change() as db:
+            if self.get(instance_id).category_id != category_id:
+                raise NotFound(f"category {category_id!r} has no instance {instance_id!r}")
             entry_id = record(db, "forget", category_id, {"instance": instance_id}, {}, actor)
-            db.execute("UPDATE instances SET removed_by = ? WHERE id = ? AND removed_by IS NULL", [entry_id, instance_id])
+            db.execute("UPDATE instances SET removed_by = ? WHERE id = ?", [entry_id, instance_id])
             if is_empty(db, category_id):
                 raise Conflict(f"instance {instance_id!r} is the last of category {category_id!r}; delete the category instead")
 

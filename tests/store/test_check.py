@@ -70,7 +70,8 @@ def test_a_damaged_category_stops_neither_its_recognition_nor_the_others(full: M
 def test_damaged_views_of_observations_and_scans_are_named_as_such(full: Memory) -> None:
     for kind in ("observations", "scans"):
         flip(next((full.folder / kind).rglob("000_rgb.png")))
-    assert {damage.kind for damage in full.check().damages} == {"observation", "scan"}
+    (seen,), (scan,) = full.observations.latest(1), full.scans.in_progress(1)
+    assert {(damage.kind, damage.id) for damage in full.check().damages} == {("observation", seen.id), ("scan", scan.id)}
 
 
 @pytest.mark.parametrize(

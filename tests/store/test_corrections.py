@@ -46,12 +46,15 @@ def test_an_observation_of_nothing_joins_what_is_named(memory: Memory, category:
     assert memory.observations.get(unassigned.id).corrected_to == category.id
 
 
-def test_a_wrong_assignment_moves(memory: Memory, other: Category, assigned: Observation, encoded: EncodedBurst) -> None:
+def test_a_wrong_assignment_moves(
+    memory: Memory, category: Category, other: Category, assigned: Observation, encoded: EncodedBurst
+) -> None:
     before = assignment(memory, assigned)
     memory.corrections.to_category(assigned.id, other.id, encoded)
     after = assignment(memory, assigned)
     assert (after.id, after.category_id, after.how, after.similarity) == (before.id, other.id, "named", None)
     assert memory.observations.get(assigned.id).corrected_to == other.id
+    assert memory.audit.of(category.id, 1)[0].id == memory.audit.of(other.id, 1)[0].id == last(memory).id
 
 
 def test_a_new_category_is_made_of_it(

@@ -17,7 +17,7 @@ from core.scan import ScanRequest
 from core.views import Burst
 from store import arrays, instances
 from store.arrays import Array
-from store.connection import Connection
+from store.connection import Connection, before_change
 from store.instances import insert_instance
 from store.memory import Memory
 from store.observations import Answer, Joins
@@ -105,6 +105,17 @@ def test_the_last_one_stays(memory: Memory, category: Category) -> None:
 def test_only_of_its_own_category(memory: Memory, joined: Instance, other: Category) -> None:
     with pytest.raises(NotFound, match="has no instance"):
         memory.instances.forget(other.id, joined.id)
+
+
+def test_one_that_leaves_meanwhile_is_not_forgotten(memory: Memory, category: Category, joined: Instance, reference, burst) -> None:
+    def split() -> None:
+        before_change.reset(token)
+        memory.categories.split(category.id, [joined.id], reference, burst)
+
+    token = before_change.set(split)
+    with pytest.raises(NotFound, match="has no instance"):
+        memory.instances.forget(category.id, joined.id)
+    assert [each.instances for each in memory.categories.all()] == [1, 1]
 
 
 def test_merging_moves_every_burst(memory: Memory, category: Category, joined: Instance, other: Category) -> None:
