@@ -230,5 +230,8 @@ def _timings(clock: StageClock, encoded: EncodedBurst, estimate: PoseEstimate | 
     """Stages that say how they divide replace the whole that was measured around them."""
     laps = dict(clock.stage_ms)
     total = sum(laps.values())
+    posed = estimate.stage_ms if estimate else {}
+    if "pose" not in laps:  # it came with the decision
+        laps["decide"] -= sum(posed.values())
     stages = encoded.stage_ms | {"decide": laps["decide"]} | ({"load": laps["load"]} if "load" in laps else {})
-    return stages | (estimate.stage_ms if estimate else {}) | {"total": total}
+    return stages | posed | {"total": total}
