@@ -21,6 +21,8 @@ SMALLEST_RATE = 1e-4
 """Of false answers that may be asked for: how rare rarer ones are, some hundreds of decisions do not tell."""
 MOST_VIEWPOINTS = 64
 """Of one scan."""
+LONGEST_DAYS = 36_500
+"""That anything is kept by its age: a calendar ends, and a hundred years are for ever."""
 
 
 class Settings(BaseSettings):
@@ -55,17 +57,22 @@ class Settings(BaseSettings):
     max_tracks: int = Field(4, ge=0, description="Objects that are followed at once over WS /v1/track.")
     rate_limit: int = Field(3000, gt=0, description="Requests a minute with one key; more are answered 429 with Retry-After.")
     log: Form = Field("text", description="Lines of the log: `text` for people, `json` for programs.")
-    session_h: float = Field(12, gt=0, description="Hours after which somebody who signed in to the console is signed out.")
+    session_h: float = Field(
+        12, gt=0, le=24 * LONGEST_DAYS, description="Hours after which somebody who signed in to the console is signed out."
+    )
     backup_dir: Path | None = Field(None, description="Folder that backups are made in; beside the memory where left out.")
     encoders: int = Field(2, gt=0, description="Processes that encode bursts, of `onelook serve --cluster`.")
     solvers: int = Field(2, gt=0, description="Processes that solve poses, of `onelook serve --cluster`.")
     max_views: int = Field(32, gt=0, description="Most views in one burst.")
     max_megapixels: int = Field(128, gt=0, description="Most pixels of a burst, all views together; decoded, each takes 8 to 16 bytes.")
     scan_views: int = Field(10, ge=2, le=MOST_VIEWPOINTS, description="Viewpoints that a scan asks for.")
-    scan_expiry_h: float = Field(24, gt=0, description="Hours after which a scan expires that no views come for.")
+    scan_expiry_h: float = Field(24, gt=0, le=24 * LONGEST_DAYS, description="Hours after which a scan expires that no views come for.")
     keep_observations: int = Field(1000, gt=0, description="Observations kept, with their views; the oldest are dropped.")
     undo_days: float = Field(
-        30, ge=0, description="Days for which a rename, merge, split, correction, forgotten burst or deletion can be undone."
+        30,
+        ge=0,
+        le=LONGEST_DAYS,
+        description="Days for which a rename, merge, split, correction, forgotten burst or deletion can be undone.",
     )
 
     @property

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import importlib.metadata
+import math
 import time
 from dataclasses import fields
 
 import pytest
 from fastapi.testclient import TestClient
+from pydantic import ValidationError
 
 import service.app
 from core.calibration import Prior
@@ -67,6 +69,13 @@ def test_settings_come_from_the_environment(monkeypatch):
     monkeypatch.setenv("ONELOOK_DATA_DIR", "/somewhere")
     settings = Settings()
     assert (settings.port, str(settings.data_dir)) == (8123, "/somewhere")
+
+
+@pytest.mark.parametrize("name", ["undo_days", "scan_expiry_h", "session_h"])
+def test_a_span_beyond_the_calendar_is_refused_by_its_name(name):
+    for span in (1e8, math.inf):
+        with pytest.raises(ValidationError, match=f"{name}\n.*less than or equal"):
+            Settings(**{name: span})
 
 
 def test_two_applications_live_side_by_side(settings, backbone, tmp_path, look, parts):
