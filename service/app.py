@@ -112,7 +112,7 @@ async def _working(running: Running) -> AsyncIterator[None]:
 
 
 async def _keep_pruned(memory: Memory) -> None:
-    """Ends what has an end: scans that no views come for, what can no longer be undone, keys of old requests."""
+    """Ends what has an end; see `Memory.prune`."""
     while True:
         await anyio.sleep(PRUNE_EVERY_S)
         try:

@@ -1,4 +1,4 @@
-"""What a person or a robot changes in the memory by their own word: names, merges, splits, forgetting."""
+"""What a person or a robot changes in the memory by their own word: names, merges, splits, corrections, forgetting."""
 
 from __future__ import annotations
 

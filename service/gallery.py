@@ -108,12 +108,13 @@ class ObservationGallery:
     def correspondences(self, index: int | None) -> Picture:
         """Of one view and its best reference view; of the pose's `best_view` where `index` is None.
 
-        Raises NotFound also where there is no pose, or its category was deleted.
+        Raises NotFound also where there is no pose, its category was deleted, or the memory was computed anew since.
         """
         details = pose_details_from_arrays(self._observations.features(self._id))
         category_id = self._observations.get(self._id).category_id
         if details is None or category_id is None:
-            raise NotFound(f"observation {self._id!r} has no correspondences: it has no pose, or its category was deleted")
+            why = "it has no pose, its category was deleted, or the memory was computed anew since"
+            raise NotFound(f"observation {self._id!r} has no correspondences: {why}")
         reference_view, target_view = _pair(details, index)
         matches = details.matches
         chosen = (matches.reference_view == reference_view) & (matches.target_view == target_view)

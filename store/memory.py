@@ -174,7 +174,7 @@ class Memory:
         return self.audit.get(undo(self._connection, self.audit.get(entry_id), actor))
 
     def prune(self) -> None:
-        """Ends what has an end: expired scans, removals too old to be undone, observations over the limit, old request keys."""
+        """Ends what has an end: expired scans, observations over the limit, old request keys, sessions, removals too old to be undone."""
         self.scans.expire()
         self.observations.prune()
         self.requests.prune()

@@ -24,7 +24,7 @@ LONGEST_NAME = 200
 """Of whatever people name."""
 ScanState = Literal["requested", "collecting", "completed", "expired"]
 Assignment = Literal["scan", "decision", "named"]
-"""How a burst came to a category: by the scan it was learnt from, by the decision, or by the caller's word."""
+"""How a burst came to a category: by the scan it was learnt from, by the decision, or by the word of a caller or a person."""
 Change = Literal["create", "rename", "merge", "split", "delete", "forget", "import", "reembed", "undo", "correct"]
 """Of what was learnt."""
 Errand = Literal["calibrate", "backup", "export", "key", "revoke"]

@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 from core.reference import Reference
 from core.symmetry import CONTINUOUS
 from core.views import FloatArray
+from service.console.words import quantity
 from store.overview import Summary
 
 FEW_VIEWS = 6
@@ -44,9 +45,10 @@ def health(category: Summary) -> Health:
         return Health("poor", "poses fail", why)
     if category.views < FEW_VIEWS:
         return Health("poor", "few views", f"its reference has {category.views} views: sides that none shows cannot be matched")
-    if category.instances == 1:
-        return Health("new", "seen once", "nothing but the object of its scan was taken for it so far")
-    return Health("good", "good", f"{category.instances} bursts, and {category.recognised - category.without_pose} poses among those kept")
+    if category.instances == 1 and not category.recognised:
+        return Health("new", "seen once", "nothing but the object that it was learnt from was taken for it so far")
+    poses = category.recognised - category.without_pose
+    return Health("good", "good", f"{quantity(category.instances, 'burst')}, and {quantity(poses, 'pose')} among those kept")
 
 
 def symmetry_words(reference: Reference) -> list[str]:

@@ -128,7 +128,7 @@ def category_overlay(category_id: str, view: View, agent: AgentDep, side: Side =
 @router.get(
     "/{category_id}/cloud.ply",
     response_class=Response,
-    responses={200: {"description": "A binary PLY file", "content": {"application/octet-stream": {}}}, **problems(404, 422)},
+    responses={200: {"description": "A binary PLY file", "content": {"application/octet-stream": {}}}, **problems(404, 422, 503)},
 )
 def category_cloud(category_id: str, agent: AgentDep) -> Response:
     """The reference's points, metres in the world frame of its scan."""

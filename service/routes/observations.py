@@ -54,7 +54,7 @@ def list_observations(
     return ObservationList(observations=[observation_answer(agent, seen) for seen in found])
 
 
-@router.get("/{observation_id}", responses=problems(404, 422))
+@router.get("/{observation_id}", responses=problems(404, 422, 503))
 def get_observation(observation_id: str, query: Annotated[AnswerQuery, Query()], agent: AgentDep) -> Shown:
     """What was answered then."""
     return _as_asked(agent, agent.memory.observations.get(observation_id), query)

@@ -9,7 +9,10 @@ from fastapi import Query, Response
 from service.pictures import Picture, at_most, encode_png
 from service.schemas.problem import problems
 
-PNG_RESPONSES: dict[int | str, dict[str, Any]] = {200: {"description": "A picture", "content": {"image/png": {}}}, **problems(404, 422)}
+PNG_RESPONSES: dict[int | str, dict[str, Any]] = {
+    200: {"description": "A picture", "content": {"image/png": {}}},
+    **problems(404, 422, 503),
+}
 """The `responses` of such a route."""
 
 

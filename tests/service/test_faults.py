@@ -147,7 +147,9 @@ def test_damaged_files_are_named_where_they_are_asked_for_and_stop_nothing_else(
         if damage == "gone":
             path.unlink()
     pictures = ("rgb", "depth", "mask", "saliency", "foreground", "pca", "overlay")
+    documented = client.get("/openapi.json").json()["paths"]
     for address in (*(f"views/0/{kind}.png" for kind in pictures), "cloud.ply"):
+        assert "503" in documented[f"/v1/categories/{{category_id}}/{address.replace('0', '{view}')}"]["get"]["responses"]
         unavailable(client.get(f"/v1/categories/{category['id']}/{address}"), "restore it from a backup")
         assert client.get(f"/v1/categories/{other['id']}/{address}").status_code == 200
     seen = client.post("/v1/observations", files=parts(look("bright", views=4))).json()
@@ -156,6 +158,16 @@ def test_damaged_files_are_named_where_they_are_asked_for_and_stop_nothing_else(
     assert client.post("/v1/observations", files=parts(look("dark", views=4))).json()["pose"] is not None
     unavailable(client.post("/v1/memory/export"), "damaged")
     assert client.post("/v1/memory/export", params={"category_id": other["id"]}).status_code == 200
+
+
+def test_damaged_features_of_an_observation_are_told_as_documented(client, settings, look, parts):
+    seen = client.post("/v1/observations", files=parts(look())).json()["id"]
+    (settings.data_dir / "observations" / seen / "features.npz").write_bytes(b"")
+    assert client.get(f"/v1/observations/{seen}").status_code == 200
+    for ending in ("?include=debug", "/pca.png"):
+        unavailable(client.get(f"/v1/observations/{seen}{ending}"), "restore it from a backup")
+        path = "/v1/observations/{observation_id}" + ending.partition("?")[0]
+        assert "503" in client.get("/openapi.json").json()["paths"][path]["get"]["responses"]
 
 
 def test_damaged_views_of_a_scan_make_no_category(client, settings, look, parts):

@@ -95,7 +95,7 @@ def test_a_category_shows_what_it_was_learnt_from(client, cup):
         assert len(set(re.findall(rf"/views/\d/{kind}.png", text))) == 6
     assert f'data-scene="/categories/{cup}/scene"' in text
     assert "1 observation<" in text
-    assert "the request naming it" in text
+    assert "somebody naming it" in text
     assert len(re.findall('type="checkbox"', text)) == 2
 
 
@@ -245,6 +245,11 @@ def summary(**changes):
 )
 def test_health_says_what_to_mend(changes, word):
     assert health(summary(**changes)).word == word
+
+
+def test_what_was_recognised_and_did_not_join_was_seen_all_the_same():
+    told = health(summary(instances=1, recognised=1))
+    assert (told.word, told.why) == ("good", "1 burst, and 1 pose among those kept")
 
 
 def test_symmetries_are_worded_by_their_axis():
