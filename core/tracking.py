@@ -54,7 +54,8 @@ class Track:
 
 def seen(
     track: Track,
-    candidates: Sequence[Sim3],
+    poses: Sequence[Sim3],
+    symmetries: FloatArray,
     *,
     center_m: FloatArray,
     diameter_m: float,
@@ -65,25 +66,25 @@ def seen(
     """The track after a frame that gave a pose.
 
     Args:
-        candidates: the estimate and what may be meant as well: its alternatives, and each turned by a symmetry. Most credible first.
+        poses: the estimate and its alternatives, most credible first.
+        symmetries: of the reference, shape (S, 3, 3): whatever is found may be meant after one of them as well.
         center_m: the object's middle in the reference's world, shape (3,).
         diameter_m: the reference's.
         age_s: mean age of the views that the estimate rests on.
         elapsed_s: since the last frame.
     """
     if track.pose is None:
-        return Track(candidates[0], age_s)
-    last = track.pose
-    near = [pose for pose in candidates if _near(last, pose, center_m, diameter_m, config)]
-    if near:
-        chosen = min(near, key=lambda pose: float(rotation_angle_deg(pose.rotation, last.rotation)))
-        mixed = blend(last, chosen, center_m, config.weight)
+        return Track(poses[0], age_s)
+    chosen = _nearest(track.pose, with_symmetries(poses, symmetries, center_m), center_m, diameter_m, config)
+    if chosen is not None:
+        mixed = blend(track.pose, chosen, center_m, config.weight)
         return Track(mixed, config.weight * age_s + (1 - config.weight) * (track.data_age_s + elapsed_s))
-    again = track.jumped is not None and _near(track.jumped, candidates[0], center_m, diameter_m, config)
-    jumps = track.jumps + 1 if again else 1
+    alike = with_symmetries(poses[:1], symmetries, center_m)
+    again = None if track.jumped is None else _nearest(track.jumped, alike, center_m, diameter_m, config)
+    jumped, jumps = (poses[0], 1) if again is None else (again, track.jumps + 1)
     if jumps >= config.believe_after:
-        return Track(candidates[0], age_s)
-    return replace(track, jumped=candidates[0], jumps=jumps, data_age_s=track.data_age_s + elapsed_s, misses=0)
+        return Track(jumped, age_s)
+    return replace(track, jumped=jumped, jumps=jumps, data_age_s=track.data_age_s + elapsed_s, misses=0)
 
 
 def missed(track: Track, elapsed_s: float, config: TrackConfig) -> Track:
@@ -109,7 +110,14 @@ def blend(before: Sim3, after: Sim3, center_m: FloatArray, weight: float) -> Sim
     return Sim3(scale, rotation, middle - scale * rotation @ center_m)
 
 
-def _near(before: Sim3, after: Sim3, center_m: FloatArray, diameter_m: float, config: TrackConfig) -> bool:
-    moved_m = float(np.linalg.norm(after.apply(center_m) - before.apply(center_m)))
-    turned_deg = float(rotation_angle_deg(after.rotation, before.rotation))
-    return turned_deg <= config.jump_deg and moved_m <= config.jump_extent * diameter_m * before.scale
+def _nearest(before: Sim3, poses: Sequence[Sim3], center_m: FloatArray, diameter_m: float, config: TrackConfig) -> Sim3 | None:
+    """Of those that are no jump from a pose, the one turned least; None where all are."""
+
+    def turned_deg(pose: Sim3) -> float:
+        return float(rotation_angle_deg(pose.rotation, before.rotation))
+
+    def jumps(pose: Sim3) -> bool:
+        moved_m = float(np.linalg.norm(pose.apply(center_m) - before.apply(center_m)))
+        return turned_deg(pose) > config.jump_deg or moved_m > config.jump_extent * diameter_m * before.scale
+
+    return min((pose for pose in poses if not jumps(pose)), key=turned_deg, default=None)

@@ -14,7 +14,7 @@ from core.novelty import Decision
 from core.pose import PoseConfig, PoseEstimator
 from core.reference import Reference
 from core.sim3 import Sim3
-from core.tracking import Track, TrackConfig, missed, seen, with_symmetries
+from core.tracking import Track, TrackConfig, missed, seen
 from core.views import Burst, View
 from core.warm import Settled, WarmConfig, follow, settle
 from service.agent import Agent
@@ -135,7 +135,8 @@ class Tracker:
         before = self._track
         self._track = seen(
             before,
-            with_symmetries(poses, reference.symmetries, center),
+            poses,
+            reference.symmetries,
             center_m=center,
             diameter_m=cloud_extent_m(reference.cloud_m),
             age_s=float(np.mean([now_s - time_s for _, time_s in self._views])),

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 import pytest
@@ -12,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from core.sim3 import Sim3, rotation_angle_deg
 from core.tracking import Track, TrackConfig, blend, missed, seen, with_symmetries
+from core.views import FloatArray
 
 CENTER = np.array([0.3, -0.2, 0.5])
 CONFIG = TrackConfig()
@@ -25,7 +25,9 @@ def turned(angle_deg: float, scale: float = 1.0, shift: Sequence[float] = (0, 0,
     return Sim3(scale, rotation, CENTER + shift - scale * rotation @ CENTER)
 
 
-step = partial(seen, center_m=CENTER, diameter_m=0.2, age_s=0.2, elapsed_s=0.1, config=CONFIG)
+def step(track: Track, poses: Sequence[Sim3], symmetries: FloatArray = NONE) -> Track:
+    """The track a frame later."""
+    return seen(track, poses, symmetries, center_m=CENTER, diameter_m=0.2, age_s=0.2, elapsed_s=0.1, config=CONFIG)
 
 
 def test_the_first_pose_is_reported_as_it_is() -> None:
@@ -49,7 +51,7 @@ def test_the_reported_age_is_the_lag_of_an_object_that_turns_steadily() -> None:
     track, frames, per_frame_deg = Track(), 60, 2.0
     config = replace(CONFIG, weight=0.25)
     for frame in range(frames):  # each estimate is of the moment itself
-        track = seen(track, [turned(per_frame_deg * frame)], center_m=CENTER, diameter_m=0.2, age_s=0.0, elapsed_s=0.1, config=config)
+        track = seen(track, [turned(per_frame_deg * frame)], NONE, center_m=CENTER, diameter_m=0.2, age_s=0.0, elapsed_s=0.1, config=config)
     assert track.pose is not None
     behind_deg = float(rotation_angle_deg(track.pose.rotation, turned(per_frame_deg * (frames - 1)).rotation))
     assert behind_deg / per_frame_deg * 0.1 == pytest.approx(track.data_age_s, rel=0.01)
@@ -58,7 +60,7 @@ def test_the_reported_age_is_the_lag_of_an_object_that_turns_steadily() -> None:
 def test_a_symmetric_flip_is_not_reported() -> None:
     track = step(Track(), [turned(0)])
     for angle in (180, 3, 184, 176):
-        track = step(track, with_symmetries([turned(angle)], HALF_TURN, CENTER))
+        track = step(track, [turned(angle)], HALF_TURN)
         assert track.pose is not None
         assert rotation_angle_deg(track.pose.rotation, np.eye(3)) < 5
         assert np.allclose(track.pose.apply(CENTER), CENTER)
@@ -105,6 +107,22 @@ def test_a_moved_object_is_a_jump_too() -> None:
     track = step(step(track, [away]), [away])
     assert track.pose is not None
     assert np.allclose(track.pose.translation, [0.5, 0, 0])
+
+
+def test_a_moved_symmetric_object_is_believed_by_whichever_of_its_poses_is_found() -> None:
+    track = step(Track(), [turned(0)])
+    for angle in (10, 190, 10):
+        track = step(track, [turned(angle, shift=(0.5, 0, 0))], HALF_TURN)
+    assert track.pose is not None
+    assert np.allclose(track.pose.as_matrix(), turned(10, shift=(0.5, 0, 0)).as_matrix())
+
+
+def test_an_alternative_does_not_speak_for_a_jump() -> None:
+    track = step(step(Track(), [turned(0)]), [turned(100)])
+    for _ in range(CONFIG.believe_after):
+        track = step(track, [turned(200), turned(100)])
+    assert track.pose is not None
+    assert np.allclose(track.pose.rotation, turned(200).rotation)
 
 
 def test_an_object_is_lost_after_a_while_and_found_anew() -> None:
