@@ -55,7 +55,7 @@ class AblationRow:
 def run(data: Path, views: Sequence[str], limit: int, json: Path | None, seed: int, backbone: str) -> list[AblationRow]:
     """Every change of CHANGES under every count of views; prints and returns the table.
 
-    Raises InvalidInput for bad view counts, or data without pairs or ground truth.
+    Raises InvalidInput for bad view counts, or data without pairs, ground truth or enough views.
     """
     network = load_backbone(backbone)
     jobs = pair_jobs(data, views, limit, seed, Encoder(network))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from benchmarks.encoded import encode_all, read_views
-from benchmarks.pairs import Pair, ViewCounts, choose_views, sample_pairs
+from benchmarks.pairs import Pair, ViewCounts, choose_views, require_views, sample_pairs
 from clients.datasets.folders import Sequence as Recording
 from clients.datasets.sources import find_sequences
 from clients.pose_error import rotation_error_deg
@@ -49,10 +49,11 @@ class PairJob:
 def pair_jobs(data: Path | str, views: Sequence[str], limit: int, seed: int, encoder: Encoder) -> list[PairJob]:
     """A job for each sampled pair and each of `views`, encoding what is not yet.
 
-    Raises InvalidInput for bad view counts, or data without pairs or ground truth.
+    Raises InvalidInput for bad view counts, or data without pairs, ground truth or enough views.
     """
-    counts = [ViewCounts.parse(text) for text in views]
+    counts = list(dict.fromkeys(map(ViewCounts.parse, views)))
     pairs = sample_pairs(find_sequences(data), limit, seed)
+    require_views([sequence for pair in pairs for sequence in pair], counts)
     files = encode_pairs(pairs, encoder)
     return [PairJob((a, b), (files[a.key], files[b.key]), count, seed) for count in counts for a, b in pairs]
 

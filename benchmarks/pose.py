@@ -130,7 +130,7 @@ def run(data: Path, sweep: Sweep, limit: int | None, json: Path | None, seed: in
 def measure(data: Path, sweeps: Sequence[Sweep], limit: int | None, seed: int, backbone: str) -> tuple[list[PoseRow], dict[str, object]]:
     """The rows of every setting of `sweeps`, in order, and what they depend on besides. See `run`."""
     network = load_backbone(backbone)
-    settings = [setting for sweep in sweeps for setting in sweep.settings(network.dim)]
+    settings = list(dict.fromkeys(setting for sweep in sweeps for setting in sweep.settings(network.dim)))
     pairs = sample_pairs(find_sequences(data), DEFAULT_LIMIT if limit is None else limit, seed)
     require_views([sequence for pair in pairs for sequence in pair], [setting.views for setting in settings])
     files = encode_pairs(pairs, Encoder(network))

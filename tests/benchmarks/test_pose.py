@@ -131,6 +131,11 @@ def test_a_refused_pose_counts_as_180(recorded: Path, tmp_path: Path, monkeypatc
     assert json.loads((tmp_path / "pose.json").read_text())["rows"][0]["median_t"] is None
 
 
+def test_a_setting_that_is_named_twice_is_run_once(recorded: Path) -> None:
+    rows = run(recorded, Sweep(["ucd", "ucd"], ["4", "4"], dims=[32, 32]), 1, None)
+    assert [(row.category, row.pairs) for row in rows] == [("egg", 1), ("all", 1)]
+
+
 def test_all_is_the_mean_over_categories_not_over_pairs(recorded: Path) -> None:
     large, small = find_sequences(recorded)
     setting = Setting(ViewCounts("4", 4, 4), contender("ucd", PoseOptions(), 64))
