@@ -97,7 +97,7 @@ class Found:
     rates: list[Row]
     """Of `rate_rows`; none without `best`."""
     hardest: int | None
-    """The burst that EASIER goes without; None without `best`."""
+    """The burst that EASIER goes without; None without `best`, and where no two objects of a kind would be left."""
 
 
 def run(
@@ -156,18 +156,20 @@ def run(
 def measure(
     tables: Mapping[str, PairScores | BestPairs], labels: NDArray[np.intp], draw: Callable[[NDArray[np.intp]], list[list[int]]]
 ) -> Found:
-    """Episodes of every score, and of `best` also without the hardest burst; `draw` gives the orders for labels, shape (N,)."""
+    """Episodes of every score, and of `best` without the hardest burst where one can go; `draw` gives orders for labels, shape (N,)."""
     orders = draw(labels)
     rows = [row for name, table in tables.items() for row in score_rows(name, table, labels, orders)]
     best = tables.get(BEST)
     if not isinstance(best, BestPairs):
         return Found(rows, [], None)
+    rates = rate_rows(BEST, best, labels, orders)
     left_out = hardest(best.single(), labels)
     fewer, easier = np.delete(labels, left_out), best.without(left_out)
+    if np.bincount(fewer).max() < 2:
+        return Found(rows, rates, None)
     fewer_orders = draw(fewer)
     rows += score_rows(EASIER, easier, fewer, fewer_orders)
-    rates = rate_rows(BEST, best, labels, orders) + rate_rows(EASIER, easier, fewer, fewer_orders)
-    return Found(rows, rates, left_out)
+    return Found(rows, rates + rate_rows(EASIER, easier, fewer, fewer_orders), left_out)
 
 
 def _all_tables(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
@@ -40,6 +41,13 @@ def test_every_score_has_a_curve_and_a_summary_and_best_a_row_for_each_rate(two_
     assert len(written["rows"]) == len(rows)
     assert written["meta"]["hardest"] in {"egg/large", "egg/small", "plate/a", "plate/b"}
     assert picture.stat().st_size > 10_000
+
+
+def test_two_objects_of_one_kind_and_one_of_another_are_enough(two_kinds: Path, small_world: Any) -> None:
+    small_world(discovery)
+    shutil.rmtree(two_kinds / "plate" / "b")
+    rows = run(two_kinds, [BEST], None, episodes=2, length=4, picture=None)
+    assert [row["score"] for row in rows if "auroc" in row] == [BEST, TOKENS]
 
 
 @pytest.mark.parametrize("asked", [[], ["added"], [BEST, "added"]])
