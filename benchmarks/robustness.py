@@ -171,6 +171,8 @@ def plan(recordings: Recordings, limit: int | None, degradations: Sequence[Degra
 
     One target of each category comes first, one degradation after the other: a smaller limit takes a prefix of a larger one's.
     """
+    if any(each.name == CLUTTER for each in degradations) and len({sequence.category for sequence in recordings.sequences}) < 2:
+        raise InvalidInput("degradation", f"{CLUTTER} sets objects of another category around, and there is one alone; name others")
     geometric = {each.name: each.strengths for each in degradations if not each.repaints}
     groups: list[dict[str, tuple[float, ...]]] = [{CLEAN: (0.0,), **geometric}]
     groups += [{each.name: each.strengths} for each in degradations if each.repaints]

@@ -104,6 +104,12 @@ def test_targets_may_be_of_some_categories_and_strengths_the_last_ones(two_kinds
     assert [row["strength"] for row in rows[:-1]] == [0, 5]
 
 
+def test_clutter_needs_things_of_another_kind(recorded: Path) -> None:
+    with pytest.raises(InvalidInput, match="of another category") as caught:
+        run(recorded, None, None, limit=1, degradations=["clutter"])
+    assert caught.value.field == "degradation"
+
+
 def test_figures_of_known_outcomes() -> None:
     right, wrong = PoseError(10, 0, 0), PoseError(100, 0, 0)
     found = figures([Outcome("x", 1, (right, wrong), KNOWN), Outcome("x", 1, (right, right), MISSED)])
