@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import groupby
+from itertools import groupby, islice
 from pathlib import Path
 
 import cv2
@@ -53,21 +53,19 @@ MEAN_COLUMNS = ("iou", "precision", "recall", "missed")
 def run(data: Path, json: Path | None, sources: Sequence[str], limit: int | None, backbone: str) -> list[IsolationRow]:
     """Compares `sources` of foreground on up to `limit` sequences a category of `data`; prints and returns the table.
 
-    Raises InvalidInput where no sequence has silhouettes, or for a source that the backbone does not have.
+    Raises InvalidInput where no view has a silhouette, or for a source that the backbone does not have.
     """
     groups = folders.by_category(find_sequences(data)).values()
-    sequences = [sequence for group in groups for sequence in group[: DEFAULT_LIMIT if limit is None else limit]]
-    sequences = [sequence for sequence in sequences if any((sequence.path / "mask_visib").glob("*.png"))]
+    most = DEFAULT_LIMIT if limit is None else limit
+    sequences = [sequence for group in groups for sequence in islice(filter(_has_silhouettes, group), most)]
     if not sequences:
-        raise InvalidInput("data", f"no sequence below {data} has silhouettes (mask_visib/), which this benchmark scores against")
+        expected = "in the data layout mask_visib/000000_000000.png for rgb/000000.*"
+        raise InvalidInput("data", f"no view below {data} has a silhouette, which this benchmark scores against: {expected}")
     network = load_backbone(backbone)
     rows: list[IsolationRow] = []
     for source in sources:
         files = encode_all(sequences, Encoder(network, EncoderConfig(foreground=source)))
-        scores = [(sequence.category, score) for sequence, file in zip(sequences, files) for score in _scores(sequence, file)]
-        if not scores:
-            raise InvalidInput("data", f"no silhouette below {data} is a view's; expected mask_visib/000000_000000.png for rgb/000000.*")
-        rows += table_rows(source, scores)
+        rows += table_rows(source, [(each.category, score) for each, file in zip(sequences, files) for score in _scores(each, file)])
     meta = {"benchmark": "isolation", "data": data, "limit": limit, "backbone": network.name, "fingerprint": network.fingerprint}
     report(f"Isolation, {data}", rows, meta, json)
     return rows
@@ -101,6 +99,10 @@ def found_mask(view: EncodedView, height: int, width: int) -> NDArray[np.bool_]:
     inside = square[top - window.y0 : height - window.y0, left - window.x0 : width - window.x0]
     mask[top : top + inside.shape[0], left : left + inside.shape[1]] = inside
     return mask
+
+
+def _has_silhouettes(sequence: folders.Sequence) -> bool:
+    return any(view.mask is not None for view in folders.load_burst(sequence, masks=True).views)
 
 
 def _scores(sequence: folders.Sequence, file: Path) -> list[Overlap]:

@@ -52,8 +52,8 @@ def run(data: Path, json: Path | None, views: int, limit: int | None, backbone: 
 
     Raises InvalidInput where no sequence has a ground truth.
     """
-    groups = folders.by_category(find_sequences(data)).values()
-    sequences = [sequence for group in groups for sequence in group[:limit] if sequence.world_from_model is not None]
+    groups = folders.by_category([sequence for sequence in find_sequences(data) if sequence.world_from_model is not None])
+    sequences = [sequence for group in groups.values() for sequence in group[:limit]]
     if not sequences:
         raise InvalidInput("data", f"no sequence below {data} has scene_gt.json, which declared symmetries need to be compared")
     network = load_backbone(backbone)

@@ -1,4 +1,4 @@
-"""The pose benchmark on CO3D's published format: the paper's evaluation, on two objects whose pose is known."""
+"""Benchmarks on CO3D's published format: the paper's evaluation, on two objects whose pose is known, and isolation against its masks."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks import pose
+from benchmarks import isolation, pose
 from benchmarks.contenders import Sweep
 from core.camera_poses import hemisphere
 from core.sim3 import Sim3
@@ -46,3 +46,10 @@ def test_labelled_sequences_are_estimated_and_translations_scored_in_the_papers_
     diagonals = row.median_t * np.linalg.norm(6.0 * 2 * HALF_AXES) / longest * 2 * np.pi
     assert row.median_t_2pi == pytest.approx(diagonals, rel=0.1)
     assert row.acc_t0_5 == 100
+
+
+def test_isolation_is_scored_against_its_masks(tmp_path: Path, ellipsoid: Any, small_world: Any) -> None:
+    small_world(isolation)
+    write_annotations(tmp_path / "co3d", "egg", sequence(tmp_path / "co3d", "1_1_1", ellipsoid(HALF_AXES), REFERENCE))
+    *_, everything = isolation.run(Path(f"co3d:{tmp_path / 'co3d'}"), None, ["saliency"], limit=None, backbone="colour")
+    assert everything.views == 4

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -48,16 +49,15 @@ def test_an_object_on_black_is_found(recorded: Path, small_world: Any) -> None:
     assert everything.views == 8
 
 
-def test_silhouettes_that_are_no_views_are_none(recorded: Path, small_world: Any) -> None:
+def test_the_limit_counts_objects_with_silhouettes(recorded: Path, small_world: Any) -> None:
     small_world(isolation)
+    shutil.rmtree(recorded / "egg" / "large" / "mask_visib")
+    *_, everything = isolation.run(recorded, None, ["saliency"], limit=1, backbone="colour")
+    assert everything.views == 4
+
+
+def test_silhouettes_that_are_no_views_are_none(recorded: Path) -> None:
     for mask in recorded.rglob("mask_visib/*.png"):
         mask.rename(mask.with_name(f"{mask.stem[:6]}.png"))
-    with pytest.raises(InvalidInput, match="no silhouette below .* is a view's"):
-        isolation.run(recorded, None, ["saliency"], limit=None, backbone="colour")
-
-
-def test_silhouettes_are_needed(tmp_path: Path, recorded: Path) -> None:
-    for mask in recorded.rglob("mask_visib/*.png"):
-        mask.unlink()
-    with pytest.raises(InvalidInput, match="silhouettes"):
+    with pytest.raises(InvalidInput, match="no view below .* has a silhouette"):
         isolation.run(recorded, None, isolation.SOURCES, limit=None, backbone="colour")

@@ -57,6 +57,13 @@ def test_an_object_painted_by_place_has_none(recorded: Path, tmp_path: Path, sma
     assert (tmp_path / "rows.json").exists()
 
 
+def test_the_limit_counts_objects_that_can_be_judged(recorded: Path, small_world: Any) -> None:
+    small_world(symmetries)
+    (recorded / "egg" / "large" / "scene_gt.json").unlink()
+    *_, everything = symmetries.run(recorded, None, views=10, limit=1, backbone="colour")
+    assert everything.objects == 1
+
+
 def test_a_ground_truth_is_needed(tmp_path: Path, recorded: Path) -> None:
     for file in recorded.rglob("scene_gt.json"):
         file.unlink()
