@@ -36,6 +36,11 @@ class OneLookGroup(TyperGroup):
                 raise
             _say_error(f"this command needs {library}, which is not installed; run: pip install 'onelook[server]'")
             raise typer.Exit(1) from None
+        except OSError as error:
+            if error.filename is None:
+                raise
+            _say_error(f"{error.filename}: {error.strerror}; name another file or folder")
+            raise typer.Exit(1) from None
 
 
 app = typer.Typer(

@@ -9,7 +9,7 @@ from typing import Annotated, Protocol, TypeVar
 import typer
 
 from clients.answers.categories import Category
-from clients.cli.terminal import URL, Json, Url, console, print_json, print_table, when
+from clients.cli.terminal import URL, Json, Url, console, print_json, print_table, require_behind, when
 from clients.errors import ClientError
 from clients.robot import RobotClient
 
@@ -23,6 +23,8 @@ def categories(context: typer.Context, url: Url = URL, json: Json = False) -> No
     """List the categories of the memory, or rename or forget one."""
     if context.invoked_subcommand is None:
         list_categories(url, json)
+    else:
+        require_behind(context)
 
 
 @app.command("list")
@@ -79,7 +81,7 @@ def find(categories: Sequence[NamedT], which: str) -> NamedT:
     found = [each for each in categories if each.name == which] or [each for each in categories if each.id.startswith(which)]
     if len(found) != 1:
         called = f"{len(found)} categories are called {which!r} or have" if found else f"no category is called {which!r} or has"
-        raise ClientError(f"{called} an id that starts so; `onelook categories list` shows them")
+        raise ClientError(f"{called} an id that starts so; `onelook categories list`, or `onelook memory list` of a folder, shows them")
     return found[0]
 
 

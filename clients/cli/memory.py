@@ -11,7 +11,19 @@ from rich.text import Text
 
 from clients.cli.categories import find
 from clients.cli.service import read_settings
-from clients.cli.terminal import URL, Json, Url, console, errors, print_facts, print_json, print_table, progress_of, when
+from clients.cli.terminal import (
+    URL,
+    Json,
+    Url,
+    console,
+    errors,
+    print_facts,
+    print_json,
+    print_table,
+    progress_of,
+    require_behind,
+    when,
+)
 from clients.robot import RobotClient
 
 if TYPE_CHECKING:
@@ -27,6 +39,7 @@ Chosen = Annotated[list[str] | None, typer.Option("--category", help="Name, id o
 def memory(context: typer.Context, url: Url = URL, json: Json = False) -> None:
     """Show what the service says of itself and its memory, or work on a memory's folder."""
     if context.invoked_subcommand is not None:
+        require_behind(context)
         return
     with RobotClient(url) as robot:
         facts = asdict(robot.info())

@@ -15,6 +15,7 @@ from rich.table import Table
 from rich.text import Text
 
 from clients.robot import DEFAULT_URL
+from core.errors import InvalidInput
 
 T = TypeVar("T")
 LOG_WIDTH = 120
@@ -28,6 +29,14 @@ Json = Annotated[bool, typer.Option("--json", help="Print JSON for programs.")]
 SOURCE = "a folder in the data layout, or FORMAT:FOLDER with a format of docs/data.md"
 Folder = Annotated[str, typer.Argument(help=f"A recorded object: {SOURCE}.")]
 URL = DEFAULT_URL
+
+
+def require_behind(context: typer.Context) -> None:
+    """Raises InvalidInput for an option before the subcommand, which has its own: `--url` there would name a service that is not asked."""
+    for name in context.params:
+        source = context.get_parameter_source(name)
+        if source is not None and source.name == "COMMANDLINE":
+            raise InvalidInput(f"--{name}", f"goes behind {context.invoked_subcommand}, not before it")
 
 
 def progress_bar(items: Iterable[T], doing: str, total: int) -> Iterator[T]:

@@ -175,6 +175,29 @@ def test_errors_are_one_sentence_with_the_remedy(words: list[str], says: str) ->
     assert "Traceback" not in failed.output
 
 
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["categories", "--url", "http://127.0.0.1:9", "forget", "mug"], "--url: goes behind forget"),
+        (["memory", "--json", "info"], "--json: goes behind info"),
+    ],
+)
+def test_an_option_before_its_subcommand_is_refused(words: list[str], says: str) -> None:
+    """It would be ignored, and a category forgotten by another service than the one that was named."""
+    refused = onelook(*words)
+    assert refused.exit_code == 1
+    assert says in refused.stderr
+
+
+def test_a_file_where_a_folder_is_to_be_made_is_named(tmp_path: Path) -> None:
+    taken = tmp_path / "taken"
+    taken.touch()
+    for words in (["render", "--category", "mug", "--out", taken], ["simulate", "--out", taken / "run"], ["rearrange", "--out", taken]):
+        said = onelook(*words)
+        assert said.exit_code == 1
+        assert said.stderr.startswith(f"error: {taken}")
+
+
 def test_a_folder_of_many_objects_and_an_unknown_category_are_refused(url: str, recordings: list[Sequence]) -> None:
     assert "holds 3 objects; name one" in onelook("observe", recordings[0].path.parent).output
     assert "no category is called 'cup'" in onelook("categories", "forget", "cup", "--url", url).output
