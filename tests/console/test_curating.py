@@ -7,6 +7,8 @@ import re
 import pytest
 from playwright.sync_api import expect
 
+from tests.service.conftest import until
+
 PHONE = {"width": 390, "height": 844}
 
 
@@ -79,12 +81,10 @@ def test_a_category_is_turned_in_space(tab, cup):
     before = canvas.screenshot()
     canvas.focus()
     page.keyboard.press("ArrowRight")
-    page.wait_for_timeout(100)
+    until(lambda: canvas.screenshot() != before)
     turned = canvas.screenshot()
-    assert turned != before
     page.get_by_role("button", name="Components").click()
-    page.wait_for_timeout(100)
-    assert canvas.screenshot() != turned
+    until(lambda: canvas.screenshot() != turned)
     cameras = page.get_by_role("button", name="Cameras")
     cameras.click()
     expect(cameras).to_have_attribute("aria-pressed", "true")

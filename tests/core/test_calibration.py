@@ -8,15 +8,19 @@ from scipy.stats import norm, t
 
 from core.calibration import PRIOR_SAMPLES, Calibration, Prior, Samples
 
-RNG = np.random.default_rng(0)
 PRIOR = Samples(tuple(np.random.default_rng(1).normal(0.5, 0.3, 20)), (2.0, 2.5))
 
 
+@pytest.fixture
+def rng() -> np.random.Generator:
+    return np.random.default_rng(0)
+
+
 @pytest.mark.parametrize("rate", [0.01, 0.05])
-def test_many_samples_of_its_own_give_the_quantile_asked_for(rate: float) -> None:
-    rivals = RNG.normal(0.1, 0.05, 20_000)
+def test_many_samples_of_its_own_give_the_quantile_asked_for(rate: float, rng: np.random.Generator) -> None:
+    rivals = rng.normal(0.1, 0.05, 20_000)
     threshold = Calibration.fit(rivals, PRIOR).threshold(rate)
-    assert rate / 2 < (RNG.normal(0.1, 0.05, 200_000) > threshold).mean() < rate * 2
+    assert rate / 2 < (rng.normal(0.1, 0.05, 200_000) > threshold).mean() < rate * 2
 
 
 def test_few_samples_leave_the_prior_and_are_more_careful() -> None:
@@ -34,21 +38,21 @@ def test_of_what_ships_the_upper_side_counts_too() -> None:
 
 
 @pytest.mark.parametrize("count", [10, 30, 100])
-def test_a_memory_where_all_is_more_alike_than_what_ships_keeps_the_rate(count: int) -> None:
+def test_a_memory_where_all_is_more_alike_than_what_ships_keeps_the_rate(count: int, rng: np.random.Generator) -> None:
     prior = Samples(tuple(norm.ppf((np.arange(20) + 0.5) / 20)), PRIOR.own)
-    thresholds = [Calibration.fit(RNG.normal(2, 1, count), prior).threshold(0.01) for _ in range(200)]
+    thresholds = [Calibration.fit(rng.normal(2, 1, count), prior).threshold(0.01) for _ in range(200)]
     assert np.mean(norm.sf(np.array(thresholds) - 2)) < 0.02
 
 
-def test_objects_falsely_called_novel_hardly_move_the_threshold() -> None:
-    rivals = RNG.normal(0.1, 0.05, 300)
+def test_objects_falsely_called_novel_hardly_move_the_threshold(rng: np.random.Generator) -> None:
+    rivals = rng.normal(0.1, 0.05, 300)
     clean = Calibration.fit(rivals, PRIOR)
-    mixed = Calibration.fit(np.concatenate([rivals, RNG.normal(0.6, 0.1, 60)]), PRIOR)
+    mixed = Calibration.fit(np.concatenate([rivals, rng.normal(0.6, 0.1, 60)]), PRIOR)
     assert mixed.threshold(0.01) - clean.threshold(0.01) < clean.spread
 
 
-def test_probability_grows_with_the_evidence_and_is_even_in_the_middle() -> None:
-    calibration = Calibration.fit(RNG.normal(0.1, 0.05, 300), PRIOR)
+def test_probability_grows_with_the_evidence_and_is_even_in_the_middle(rng: np.random.Generator) -> None:
+    calibration = Calibration.fit(rng.normal(0.1, 0.05, 300), PRIOR)
     levels = [calibration.probability(evidence) for evidence in np.linspace(-1, 3, 50)]
     assert levels == sorted(levels)
     assert levels[0] < 0.01

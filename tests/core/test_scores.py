@@ -14,7 +14,10 @@ from core.scores.base import Score
 from core.scores.paper import paper_mean, paper_sum
 from core.scores.pooled_best_view import best_view
 
-RNG = np.random.default_rng(0)
+
+@pytest.fixture
+def rng() -> np.random.Generator:
+    return np.random.default_rng(0)
 
 
 @pytest.fixture(params=sorted(SCORES))
@@ -33,8 +36,8 @@ def bursts_of(score: Score, *views: int) -> list[np.ndarray]:
     return [tokens_of(score, rng.normal(size=(count, 8))) for count in views]
 
 
-def test_only_the_token_that_is_named_counts_and_only_its_direction(score: Score) -> None:
-    views, other = RNG.normal(size=(3, 8)), np.zeros((3, 8))
+def test_only_the_token_that_is_named_counts_and_only_its_direction(score: Score, rng: np.random.Generator) -> None:
+    views, other = rng.normal(size=(3, 8)), np.zeros((3, 8))
     named = SimpleNamespace(**({"cls": other, "pooled": other} | {score.token: views}))
     assert np.allclose(score.tokens(named), views / np.linalg.norm(views, axis=1, keepdims=True))
 
@@ -65,15 +68,15 @@ def test_by_its_own_threshold_ten_views_alike_are_known_and_ten_that_share_nothi
     assert score.of_category([alike], other) < score.threshold < score.of_category([alike], alike)
 
 
-def test_the_sum_over_pairs_is_the_product_of_sums() -> None:
-    first, second = RNG.normal(size=(3, 8)), RNG.normal(size=(4, 8))
+def test_the_sum_over_pairs_is_the_product_of_sums(rng: np.random.Generator) -> None:
+    first, second = rng.normal(size=(3, 8)), rng.normal(size=(4, 8))
     pairs = sum(float(a @ b) for a in first for b in second)
     assert np.isclose(paper_sum(first, second), pairs)
     assert np.isclose(paper_mean(first, second), pairs / 12)
 
 
-def test_only_the_sum_grows_with_the_number_of_views() -> None:
-    tokens = RNG.normal(size=(3, 8))
+def test_only_the_sum_grows_with_the_number_of_views(rng: np.random.Generator) -> None:
+    tokens = rng.normal(size=(3, 8))
     doubled = np.concatenate([tokens, tokens])
     assert np.isclose(paper_sum(doubled, tokens), 2 * paper_sum(tokens, tokens))
     assert np.isclose(paper_mean(doubled, tokens), paper_mean(tokens, tokens))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib.metadata
 import math
-import time
 from dataclasses import fields
 
 import pytest
@@ -20,6 +19,7 @@ from service.errors import KINDS, problem_of
 from service.refusals import CalledOff, TooOften
 from service.settings import Settings
 from store.retention import Retention
+from tests.service.conftest import until
 
 
 def test_probes(client):
@@ -186,8 +186,4 @@ def test_what_has_an_end_is_ended_while_the_service_runs(settings, backbone, loo
     with TestClient(create_app(settings.model_copy(update={"scan_expiry_h": 1e-6}), backbone=backbone)) as client:
         client.post("/v1/scans", files=parts(look()))
         rows = client.app.state.running.agent.memory._connection.rows
-        for _ in range(200):
-            if rows("SELECT state FROM scans") == [{"state": "expired"}]:
-                return
-            time.sleep(0.02)
-    raise AssertionError("the scan is still open")
+        until(lambda: rows("SELECT state FROM scans") == [{"state": "expired"}])

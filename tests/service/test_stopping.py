@@ -18,6 +18,8 @@ from typing import Any
 import httpx
 import pytest
 
+from tests.service.conftest import until
+
 ROOT = Path(__file__).parents[2]
 PASS_S = 0.4
 """Encoding a burst takes two passes."""
@@ -32,11 +34,7 @@ class Process:
 
     def until(self, name: str, value: float) -> None:
         """Returns once a figure is that."""
-        for _ in range(500):
-            if f"\n{name} {value}\n" in self.http.get("/metrics").text:
-                return
-            time.sleep(0.02)
-        raise AssertionError(f"{name} never was {value}")
+        until(lambda: f"\n{name} {value}\n" in self.http.get("/metrics").text)
 
     def stop(self) -> list[dict[str, Any]]:
         """SIGTERM; the lines of the log, once it has ended as it was told to."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-import time
 
 import anyio
 import numpy as np
@@ -15,7 +14,7 @@ from service.app import create_app
 from service.batching import LARGEST_PASS, BatchingBackbone
 from service.refusals import Busy
 from service.work import WorkQueue
-from tests.service.conftest import Gate
+from tests.service.conftest import LONG_S, Gate, until
 
 
 def images(seed, views=2, side=16):
@@ -34,11 +33,10 @@ def together(batching, gate, stacks):
 
     threads = [threading.Thread(target=extract, args=(index,)) for index in range(len(stacks))]
     threads[0].start()
-    gate.entered.wait(10)
+    gate.entered.wait(LONG_S)
     for thread in threads[1:]:
         thread.start()
-    while len(batching._waiting) < len(stacks) - 1:
-        time.sleep(0.001)
+    until(lambda: len(batching._waiting) == len(stacks) - 1)
     gate.open.set()
     for thread in threads:
         thread.join()
@@ -146,7 +144,7 @@ def test_a_full_queue_is_answered_503_with_the_time_to_wait(settings, backbone, 
         files, answers = parts(look()), []
         first = threading.Thread(target=lambda: answers.append(client.post("/v1/observations", files=files)))
         first.start()
-        gate.entered.wait(10)
+        gate.entered.wait(LONG_S)
         refused = client.post("/v1/observations", files=files)
         alive = client.get("/healthz")
         gate.open.set()

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-import time
 
 import pytest
 from fastapi.testclient import TestClient
@@ -14,7 +13,7 @@ from core.errors import Conflict
 from service.app import create_app
 from service.console import demo
 from service.console.demo import Demo
-from tests.service.conftest import with_keys
+from tests.service.conftest import until, with_keys
 
 
 @pytest.fixture
@@ -78,9 +77,7 @@ def test_it_ends_with_the_service(settings, backbone, begun):
 def test_it_ends_after_a_while(client, begun, episode, monkeypatch):
     monkeypatch.setattr(demo, "LIMIT_S", 0.05)
     episode.start(client.app.state.running.agent.memory, "http://x")
-    deadline = time.monotonic() + 10
-    while episode.state().running and time.monotonic() < deadline:
-        time.sleep(0.02)
+    until(lambda: not episode.state().running)
     assert episode.state().failure == "it was stopped"
 
 
