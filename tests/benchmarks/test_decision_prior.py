@@ -48,5 +48,5 @@ def test_every_burst_gives_a_rival_and_those_with_another_of_their_kind_a_right_
     assert figures["verified"]["own"][0] == pytest.approx(figures["tokens"]["own"][0] + figures["agreement_weight"] * 0.3, abs=1e-3)
 
 
-def test_what_ships_was_written_by_this(figures: dict) -> None:
+def test_what_ships_has_the_fields_that_are_written(figures: dict) -> None:
     assert json.loads(SHIPPED.read_text()).keys() == figures.keys()

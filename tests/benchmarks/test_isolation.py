@@ -16,7 +16,7 @@ from core.crop import Window
 from core.errors import InvalidInput
 
 
-def test_overlap() -> None:
+def test_overlap_of_what_is_found_with_the_truth_by_hand() -> None:
     found, truth = np.zeros((4, 4), bool), np.zeros((4, 4), bool)
     found[:2], truth[1:] = True, True
     assert overlap(found, truth) == Overlap(iou=4 / 16, precision=4 / 8, recall=4 / 12)

@@ -42,7 +42,7 @@ def test_a_single_burst_is_as_similar_as_the_service_says(bursts: list[SimpleNam
 @pytest.mark.parametrize(
     ("positive", "negative", "expected"), [([3, 4], [1, 2], 1.0), ([1], [1], 0.5), ([1, 3], [2], 0.5), ([0], [1, 2], 0.0)]
 )
-def test_auroc(positive: list[float], negative: list[float], expected: float) -> None:
+def test_auroc_is_the_share_of_pairs_in_order_and_half_of_ties(positive: list[float], negative: list[float], expected: float) -> None:
     assert auroc(np.array(positive), np.array(negative)) == expected
 
 

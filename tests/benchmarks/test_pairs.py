@@ -55,11 +55,11 @@ def test_where_the_views_begin_depends_on_role_and_seed() -> None:
 
 
 @pytest.mark.parametrize(("text", "reference", "target"), [("10", 10, 10), ("10+3", 10, 3), ("1+1", 1, 1)])
-def test_view_counts(text: str, reference: int, target: int) -> None:
+def test_view_counts_are_of_both_or_of_each(text: str, reference: int, target: int) -> None:
     assert ViewCounts.parse(text) == ViewCounts(text, reference, target)
 
 
 @pytest.mark.parametrize("text", ["", "ten", "10+", "0", "3+0", "1+2+3", "-4"])
-def test_bad_view_counts(text: str) -> None:
+def test_what_is_no_view_count_is_refused(text: str) -> None:
     with pytest.raises(InvalidInput, match="expected a count such as 10"):
         ViewCounts.parse(text)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import pickle
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -20,7 +19,7 @@ from core.errors import InvalidInput, NoPose
 from core.pose import PoseEstimator, PoseOptions
 from core.sim3 import Sim3
 
-from .conftest import record
+from .conftest import record, travelled
 
 COLUMNS = {
     *("variant", "views", "dims", "category", "pairs", "acc30", "acc15", "acc7_5"),
@@ -56,16 +55,13 @@ def test_the_same_seed_gives_the_same_figures(recorded: Path) -> None:
 
 
 def test_a_job_and_its_result_can_travel_between_processes(recorded: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def travelled(function, jobs, *_: object) -> list[object]:
-        return [pickle.loads(pickle.dumps(function(pickle.loads(pickle.dumps(job))))) for job in jobs]
-
     here = run(recorded, Sweep(["ucd"], ["4"]), 1, None)
     monkeypatch.setattr(pose, "map_jobs", travelled)
     there = run(recorded, Sweep(["ucd"], ["4"]), 1, None)
     assert [replace(row, solve_ms=0) for row in there] == [replace(row, solve_ms=0) for row in here]
 
 
-def test_descriptor_sizes(recorded: Path) -> None:
+def test_each_descriptor_size_asked_for_has_its_rows(recorded: Path) -> None:
     rows = run(recorded, Sweep(["ucd"], ["4"], dims=[6, 64]), 1, None)
     assert [row.dims for row in rows] == [6, 6, 64, 64]
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import json
-import pickle
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -16,6 +16,8 @@ from benchmarks.degradations.catalogue import catalogue
 from benchmarks.robustness import CLEAN, Outcome, breaks_at, figures, table_rows
 from clients.pose_error import NO_POSE, PoseError
 from core.errors import InvalidInput, NoObject
+
+from .conftest import travelled
 
 KNOWN = Decisions(own=2.0, rival=1.0, right=True, nearest=True, uncertain=False, novel=False, false_known=False)
 MISSED = Decisions(own=0.0, rival=1.0, right=False, nearest=False, uncertain=False, novel=True, false_known=True)
@@ -60,9 +62,6 @@ def test_what_is_done_is_not_done_again(two_kinds: Path, backbone, monkeypatch: 
 
 
 def test_a_job_and_its_outcomes_can_travel_between_processes(two_kinds: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def travelled(function, jobs, *_: object) -> list[object]:
-        return [pickle.loads(pickle.dumps(function(pickle.loads(pickle.dumps(job))))) for job in jobs]
-
     names = only(monkeypatch, jpeg=(50,))
     here = run(two_kinds, None, None, limit=1, degradations=names, poses=False)
     monkeypatch.setattr(robustness, "map_jobs", travelled)
@@ -81,16 +80,18 @@ def test_where_no_object_is_found_there_is_no_pose_and_no_answer(two_kinds: Path
     assert clean["median_deg"] == 180
 
 
-def test_a_smaller_limit_takes_a_prefix(two_kinds: Path) -> None:
+def test_a_smaller_limit_takes_a_prefix(two_kinds: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(robustness, "table_rows", lambda *_: [])
+
     def targets(limit: int | None) -> list[str]:
         seen: list[str] = []
-        mock = pytest.MonkeyPatch()
-        mock.setattr(
-            robustness, "work", lambda job: seen.append(job.recordings.sequences[job.target].name) or [Outcome(CLEAN, 0, (NO_POSE,), KNOWN)]
-        )
-        mock.setattr(robustness, "table_rows", lambda *_: [])
+
+        def work(job: Any) -> list[Outcome]:
+            seen.append(job.recordings.sequences[job.target].name)
+            return [Outcome(CLEAN, 0, (NO_POSE,), KNOWN)]
+
+        monkeypatch.setattr(robustness, "work", work)
         run(two_kinds, None, None, limit=limit, degradations=["depth noise"])
-        mock.undo()
         return seen
 
     assert targets(1) == targets(None)[:2]

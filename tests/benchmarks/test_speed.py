@@ -14,7 +14,7 @@ from core.pose import VARIANTS
 run = partial(speed.run, rounds=1, backbone="colour", device="cpu")
 
 
-def test_medians_and_ratios() -> None:
+def test_rows_are_medians_and_their_ratio_to_an_observation() -> None:
     times = [{"look": {"total": ms}, "solve": {"match": 1.0, "total": 5.0}} for ms in (1.0, 15.0, 100.0)]
     rows = {(row.operation, row.stage): (row.ms, row.ratio) for row in speed.table_rows(times, ("look", "solve"))}
     assert rows == {("look", "total"): (15, 0.75), ("solve", "match"): (1, 0.05), ("solve", "total"): (5, 0.25)}

@@ -1,4 +1,4 @@
-"""The robot client on what is learnt: bursts of categories, merging, splitting, goals and plans; against a service."""
+"""The robot client on what is learnt: bursts of categories, merging, splitting, goals and plans, archives; against a service."""
 
 from __future__ import annotations
 
@@ -62,3 +62,21 @@ def test_the_history_is_paged(robot: RobotClient, learnt: Category, burst: Burst
     assert robot.observations(2, before=latest[-1].id)[0].id == seen[0].id
     assert latest[0].pose is not None
     assert latest[0].pose.alternatives == ()
+
+
+def test_what_was_exported_is_imported_where_it_is_not_there(robot: RobotClient, learnt: Category) -> None:
+    assert robot.memory().instances == 1
+    archive = robot.export_memory([learnt.id])
+    brought = robot.import_memory(archive)
+    assert (brought.categories, [each.id for each in brought.duplicates]) == ((), [learnt.id])
+    robot.forget(learnt.id)
+    assert [each.name for each in robot.import_memory(archive).categories] == ["car"]
+
+
+def test_a_memory_is_backed_up(robot: RobotClient, learnt: Category) -> None:
+    assert robot.backup().files > 0
+
+
+def test_where_a_threshold_is_set_a_rate_is_refused(robot: RobotClient) -> None:
+    with pytest.raises(errors.ConflictProblem, match="ONELOOK_THRESHOLD"):
+        robot.calibrate(0.02)

@@ -93,15 +93,3 @@ def test_without_a_service_the_remedy_is_said() -> None:
 def test_a_refused_stream_is_a_problem(robot: RobotClient) -> None:
     with pytest.raises(errors.InvalidInputProblem, match="after"):
         next(robot.events(after=-1))
-
-
-def test_a_memory_goes_to_another_robot(robot: RobotClient, learnt: Category) -> None:
-    assert robot.memory().instances == 1
-    archive = robot.export_memory([learnt.id])
-    brought = robot.import_memory(archive)
-    assert (brought.categories, [each.id for each in brought.duplicates]) == ((), [learnt.id])
-    robot.forget(learnt.id)
-    assert [each.name for each in robot.import_memory(archive).categories] == ["car"]
-    assert robot.backup().files > 0
-    with pytest.raises(errors.ConflictProblem, match="ONELOOK_THRESHOLD"):  # as this service was started with one
-        robot.calibrate(0.02)

@@ -28,7 +28,7 @@ def problem(moved: Sim3, right: int, wrong: int, noise: float = 0.0) -> tuple[np
     return source, target
 
 
-def test_sixty_percent_outliers(moved: Sim3, fitted_by: Estimator) -> None:
+def test_a_similarity_is_recovered_among_sixty_percent_outliers(moved: Sim3, fitted_by: Estimator) -> None:
     source, target = problem(moved, 80, 120, noise=0.002)
     fit = fitted_by(source, target, 0.03, seed=0)
     assert np.allclose(fit.target_from_reference.as_matrix(), moved.as_matrix(), atol=0.01)

@@ -39,7 +39,7 @@ def test_retrieval_is_right_to_the_spacing_of_views(variant: str, painted: Paint
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_every_way_to_match(method: str, painted: PaintedObject, moved: Sim3) -> None:
+def test_by_every_way_to_match_it_is_recovered(method: str, painted: PaintedObject, moved: Sim3) -> None:
     reference = painted.reference(6)
     estimate = PoseEstimator(PoseConfig(method=method)).estimate(reference, painted.encode(5, moved))
     assert_recovered(estimate.target_from_reference, moved)
@@ -47,7 +47,7 @@ def test_every_way_to_match(method: str, painted: PaintedObject, moved: Sim3) ->
 
 @pytest.mark.parametrize("estimator", sorted(ESTIMATORS))
 @pytest.mark.parametrize("dims", [48, 32, 24, 6, 3])
-def test_every_descriptor_size_and_estimator(dims: int, estimator: str, painted: PaintedObject, moved: Sim3) -> None:
+def test_with_every_descriptor_size_and_estimator_it_is_recovered(dims: int, estimator: str, painted: PaintedObject, moved: Sim3) -> None:
     config = PoseConfig.named("ucd", PoseOptions(dims=dims, estimator=estimator, consensus_deg=15, inlier_ratio=0.05))
     assert (config.dims, config.estimator, config.consensus_deg, config.inlier_ratio) == (dims, estimator, 15, 0.05)
     estimate = PoseEstimator(config).estimate(painted.reference(6), painted.encode(5, moved))

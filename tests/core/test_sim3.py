@@ -32,7 +32,7 @@ def test_composition_acts_as_one_after_the_other(a: Sim3, b: Sim3) -> None:
 
 
 @given(similarities())
-def test_matrix_round_trip(transform: Sim3) -> None:
+def test_a_transform_comes_back_from_its_matrix(transform: Sim3) -> None:
     assert same(Sim3.from_matrix(transform.as_matrix()), transform)
 
 
@@ -130,7 +130,7 @@ def test_a_matrix_of_a_file_s_precision_is_taken() -> None:
     assert Sim3.from_matrix(np.block([[turned, np.zeros((3, 1))], [np.eye(4)[3]]])).scale == pytest.approx(1, abs=1e-4)
 
 
-def test_angle_between_rotations() -> None:
+def test_the_angle_between_rotations_is_in_degrees() -> None:
     turned = Rotation.from_euler("z", [[40], [170]], degrees=True).as_matrix()
     assert np.allclose(rotation_angle_deg(np.eye(3), turned), [40, 170])
 

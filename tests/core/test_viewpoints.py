@@ -58,7 +58,7 @@ def test_a_rotation_that_joins_similar_views_agrees_more_than_others(painted: Pa
     assert wrong < 0
 
 
-def test_mean_rotation() -> None:
+def test_the_mean_rotation_is_between() -> None:
     assert rotation_angle_deg(mean_rotation(around_z(10, 30)), around_z(20)[0]) < 1e-4
 
 

@@ -125,11 +125,6 @@ def seeds(name: str) -> list[bytes]:
     return [path.read_bytes() for path in sorted(CORPUS.glob(f"{name}-*"))]
 
 
-def findings(name: str) -> list[bytes]:
-    """What once broke a target, and is refused since."""
-    return [path.read_bytes() for path in sorted((CORPUS / "findings").glob(f"{name}-*"))]
-
-
 def attempt(name: str, content: bytes) -> bool:
     """Whether the target took it; refusals are in order, whatever else is raised is a finding."""
     try:

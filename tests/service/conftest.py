@@ -158,6 +158,12 @@ def learnt(client: TestClient, burst: Any, name: str | None) -> dict[str, Any]:
     return answer.json()
 
 
+def lose_answers(client: TestClient) -> None:
+    """As if the process had ended between what it did and what it said."""
+    with client.app.state.running.agent.memory._connection.housekeeping() as db:
+        db.execute("UPDATE requests SET status = NULL, media_type = NULL, body = NULL")
+
+
 @pytest.fixture(scope="session")
 def ball_memory(tmp_path_factory: Any, colour_backbone: Any, look: Any, parts: Any) -> tuple[Path, dict[str, Any]]:
     """A memory that learnt a ball, to be copied, since learning takes half a second; and that category."""

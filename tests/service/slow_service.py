@@ -1,5 +1,5 @@
-"""A service in a process of its own on the synthetic world, each pass of whose backbone takes a while; run by test_stopping.py and
-test_hanging.py.
+"""A service in a process of its own on the synthetic world, each pass of whose backbone takes a while; run by test_stopping.py,
+test_hanging.py and the short soak of tests/benchmarks/.
 
 Arguments: the memory's folder, the seconds of a pass, and those that answers get at the end. Prints its address once it has a port. While
 there is a file `pass-hangs` beside the memory, a pass does not come back, and beside `disk-hangs` no commit does.

@@ -22,7 +22,7 @@ def agent(tmp_path, backbone):
         yield Agent(in_this_process(backbone), memory, CONFIG)
 
 
-def test_look_scan_know(agent, look):
+def test_a_novel_object_is_known_once_it_is_scanned(agent, look):
     seen = agent.observe(look())
     assert (seen.outcome, seen.pose) == ("novel", None)
     agent.scanning.add(seen.scan_id, look())

@@ -22,7 +22,7 @@ from store.retention import Retention
 from tests.service.conftest import until
 
 
-def test_probes(client):
+def test_probes_say_that_it_is_well(client):
     assert client.get("/healthz").json() == client.get("/readyz").json() == {"status": "ok"}
 
 

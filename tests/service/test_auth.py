@@ -12,13 +12,12 @@ from fastapi.testclient import TestClient
 from starlette.testclient import WebSocketDenialResponse
 
 from clients.asynchronous import AsyncRobotClient
-from clients.errors import PROBLEMS, NoKeyProblem, NotAllowedProblem, TooOftenProblem
+from clients.errors import NoKeyProblem, NotAllowedProblem, TooOftenProblem
 from clients.exchange import Retry
 from clients.robot import RobotClient
 from core.views import Burst
 from service.access import ACCESS, needed_role
 from service.app import create_app
-from service.errors import KINDS
 from service.guarded import include
 from service.rate import RateLimit
 from service.settings import Settings
@@ -257,10 +256,6 @@ def test_every_answer_has_the_headers_that_browsers_heed(client: TestClient) -> 
     for path in ("/healthz", "/v1/info", "/nothing"):
         assert client.get(path).headers["x-content-type-options"] == "nosniff"
         assert client.get(path).headers["x-frame-options"] == "DENY"
-
-
-def test_every_problem_is_one_exception_of_the_client() -> None:
-    assert {f"urn:onelook:problem:{name}" for _, _, name, _ in KINDS} <= set(PROBLEMS)
 
 
 def test_clients_send_their_key(settings: Settings, backbone: Any, serving: Any, look: Any, monkeypatch: pytest.MonkeyPatch) -> None:

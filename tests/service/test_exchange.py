@@ -15,7 +15,7 @@ from service.exchange import CLOCKED, MemoryRoute
 from service.guarded import GuardedRoute
 from service.routes.install import MADE, ROUTERS
 from store import audit, scans
-from tests.service.conftest import LONG_S, Gate
+from tests.service.conftest import LONG_S, Gate, lose_answers
 
 ROOT = Path(__file__).parents[2]
 KEY = {"Idempotency-Key": "4f1c"}
@@ -23,12 +23,6 @@ KEY = {"Idempotency-Key": "4f1c"}
 
 def observations(client):
     return client.get("/v1/observations").json()["observations"]
-
-
-def lose_answers(client):
-    """As if the process had ended between what it did and what it said."""
-    with client.app.state.running.agent.memory._connection.housekeeping() as db:
-        db.execute("UPDATE requests SET status = NULL, media_type = NULL, body = NULL")
 
 
 def test_a_repeated_observation_is_answered_again_and_kept_once(client, look, parts):

@@ -31,7 +31,7 @@ PARTS = {
 
 
 @pytest.mark.parametrize("case", PARTS)
-def test_hostile_json_parts(client, look, parts, case):
+def test_hostile_json_parts_are_refused_by_field(client, look, parts, case):
     content, field, word = PARTS[case]
     answer = client.post("/v1/observations", files=burst_part(parts(look()), content))
     assert answer.json()["field"].startswith(field)
@@ -50,7 +50,7 @@ BODIES = {
 
 
 @pytest.mark.parametrize("body", BODIES)
-def test_hostile_json_bodies(client, learn, body):
+def test_hostile_json_bodies_are_refused(client, learn, body):
     category = learn()
     for method, path in (("PATCH", ""), ("POST", "/merge"), ("POST", "/split"), ("POST", "/goals")):
         answer = client.request(method, f"/v1/categories/{category['id']}{path}", content=BODIES[body], headers=JSON)
@@ -74,7 +74,7 @@ def test_names_are_text_and_nothing_else(client, learn, name):
 
 @pytest.mark.parametrize("header", ["Idempotency-Key", "X-Actor", "If-None-Match", "Authorization", "X-Request-Id"])
 @pytest.mark.parametrize("value", [b"\xff\xfe", b"a" * 20_000, b"\x01\x02", b'"', b"W/"])
-def test_hostile_headers(client, look, parts, header, value):
+def test_hostile_headers_are_no_fault_of_the_service(client, look, parts, header, value):
     for answer in (
         client.post("/v1/scans", json={"observation_id": "x"}, headers={header: value}),
         client.get("/v1/categories", headers={header: value}),
@@ -101,7 +101,7 @@ FORMS_OF_MULTIPART = {
 
 
 @pytest.mark.parametrize("form", FORMS_OF_MULTIPART)
-def test_malformed_multipart(client, form):
+def test_malformed_multipart_is_refused(client, form):
     answer = client.post("/v1/observations", content=FORMS_OF_MULTIPART[form], headers=MULTIPART)
     assert answer.status_code == 422, answer.text[:300]
     assert "Traceback" not in answer.text

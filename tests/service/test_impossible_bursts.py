@@ -21,7 +21,7 @@ DEPTHS = {
 
 
 @pytest.mark.parametrize("case", DEPTHS)
-def test_depth_that_no_camera_measures(client, look, npz, case):
+def test_depth_that_no_camera_measures_is_refused(client, look, npz, case):
     change, field, word = DEPTHS[case]
     burst = look()
     depth = np.stack([change(view.depth_m) for view in burst.views]).astype(np.float32)
@@ -37,7 +37,7 @@ def test_a_few_denormal_depths_are_taken_for_not_measured(client, look, npz, lea
     assert answer["pose"]["target_from_reference"]["scale"] == pytest.approx(1, abs=0.05)
 
 
-def test_saturated_depth(client, look, parts):
+def test_saturated_depth_is_refused(client, look, parts):
     def full(about, files):
         measured = [cv2.imdecode(np.frombuffer(each, np.uint8), cv2.IMREAD_UNCHANGED) > 0 for each in files["depth"]]
         files["depth"] = [cv2.imencode(".png", each.astype(np.uint16) * 65535)[1].tobytes() for each in measured]
@@ -88,7 +88,7 @@ CAMERAS = {
 
 
 @pytest.mark.parametrize("case", CAMERAS)
-def test_cameras_that_cannot_be(client, look, parts, case):
+def test_cameras_that_cannot_be_are_refused(client, look, parts, case):
     edit, field, word = CAMERAS[case]
     for address in ("/v1/observations", "/v1/scans"):
         refused(client.post(address, files=parts(look(), edit)), 422, field, word)

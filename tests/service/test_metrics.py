@@ -31,7 +31,7 @@ def test_requests_are_counted_under_their_route(client, learn):
     assert not any(category["id"] in str(key) for key in found)
 
 
-def test_observations_stages_passes_and_the_memory(client, look, parts, learn):
+def test_observations_stages_passes_and_the_memory_are_counted(client, look, parts, learn):
     learn()
     client.post("/v1/observations", files=parts(look()))
     found = figures(client)

@@ -133,7 +133,7 @@ def test_a_bad_view_is_accepted_with_its_faults(client, scan, look, parts):
     assert all(fault["detail"] for fault in view["faults"])
 
 
-def test_options_of_a_scan(client, look, parts):
+def test_a_scan_is_as_its_options_say(client, look, parts):
     options = {"viewpoints": 20, "up": [0, 0, 2], "standoff_m": 0.9}
     scan = client.post("/v1/scans", files=parts(look()), params=options).json()
     assert (len(scan["world_from_camera"]), scan["up"], scan["up_from"], scan["radius_m"]) == (20, [0, 0, 1], "given", 0.9)

@@ -1,4 +1,4 @@
-"""What a memory should hold, as the test of random crashes models it, and what one does hold."""
+"""What a memory should hold, as the test of random crashes models it, what one does hold, and whether that is whole."""
 
 from __future__ import annotations
 

@@ -27,12 +27,10 @@ from core.encode import EncodedBurst
 from core.novelty import DecisionConfig, decide
 from core.reference import Reference
 from core.views import Burst
-from store.columns import files_from_json
-from store.contents import FOLDERS
-from store.folders import sums
 from store.memory import Memory
 from store.observations import Answer, Joins
 from store.scans import ScanRequest
+from tests.store.crash_model import require_whole
 
 MOST_CATEGORIES = 6
 Known = dict[str, list[Any]]
@@ -202,16 +200,7 @@ def archived(archive: Path) -> dict[str, str]:
 def look(folder: Path, source: Path) -> dict[str, Any]:
     """What a restart finds: everything whole, nothing left over, and what it knows."""
     with Memory.open(folder) as memory:
-        report = memory.check()
-        assert report.ok, report.damages
-        for category in memory.categories.all():
-            assert len(memory.categories.reference(category.id).views) == category.views
-            assert category.instances == len(memory.instances.of(category.id)) > 0
-        named = {memory.folder / row["folder"]: row["files"] for query in FOLDERS.values() for row in memory._connection.rows(query)}
-        scans = memory.folder / "scans"
-        there = {folder for kind in (memory.categories.root, memory.observations.root, *scans.glob("*")) for folder in kind.glob("*")}
-        assert there == set(named), there ^ set(named)
-        assert all(sums(folder) == files_from_json(files) for folder, files in named.items())
+        require_whole(memory)
         return {"version": memory.version, "known": state(memory, material(source)[2])}
 
 

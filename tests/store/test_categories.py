@@ -44,7 +44,7 @@ def test_its_first_member_is_the_scan(memory: Memory, category: Category, encode
     assert np.array_equal(member.pooled, encoded.pooled)
 
 
-def test_renaming(memory: Memory, category: Category) -> None:
+def test_a_category_is_renamed_and_unnamed(memory: Memory, category: Category) -> None:
     assert memory.categories.rename(category.id, "mug").name == "mug"
     assert memory.categories.rename(category.id, None).name is None
 

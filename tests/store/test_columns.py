@@ -53,7 +53,7 @@ def numbers(record: object) -> object:
 
 
 @pytest.mark.parametrize("changes", [{}, {"target_from_object": None, "not_9d_because": None, "symmetries": np.empty((0, 3, 3))}])
-def test_a_pose(changes: dict[str, object]) -> None:
+def test_a_pose_comes_back(changes: dict[str, object]) -> None:
     found = pose_from_json(pose_to_json(pose(**changes)))
     assert numbers(found) == numbers(pose(**changes))
     assert found.symmetries.shape == pose(**changes).symmetries.shape
@@ -68,12 +68,12 @@ def test_a_pose_of_an_earlier_version_has_what_there_was_not_yet_empty() -> None
     assert (found.boxes_px, found.target_from_object, found.not_9d_because, found.symmetries.shape) == ((), None, None, (0, 3, 3))
 
 
-def test_what_an_answer_rests_on() -> None:
+def test_what_an_answer_rests_on_comes_back() -> None:
     told = Grounds(3, 2, 1, 40.0, ((ViewFault("blur", "it is blurred"),), (), ()))
     assert grounds_from_json(grounds_to_json(told)) == told
 
 
-def test_a_request_for_views() -> None:
+def test_a_request_for_views_comes_back() -> None:
     asked = ScanRequest(
         np.array([0.1, 0.2, 0.3]), np.array([0.0, 0.6, 0.8]), 0.8, np.stack([FRAME, np.eye(4)]), 0.3, "cameras", np.stack([FRAME])
     )

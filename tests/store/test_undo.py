@@ -27,7 +27,7 @@ def test_a_change_says_who_and_what(memory: Memory, category: Category) -> None:
     assert (created.action, created.actor, created.undoable) == ("create", None, False)
 
 
-def test_undoing_a_name(memory: Memory, category: Category) -> None:
+def test_undoing_a_name_brings_the_earlier_one_back(memory: Memory, category: Category) -> None:
     memory.categories.rename(category.id, "mug")
     entry = last(memory)
     undone = memory.undo(entry.id, actor="anna")
@@ -63,7 +63,7 @@ def test_undoing_a_split_loses_no_burst(memory: Memory, category: Category, othe
         memory.categories.get(part.id)
 
 
-def test_undoing_a_forgotten_instance(memory: Memory, category: Category, other: Category) -> None:
+def test_undoing_a_forgotten_instance_brings_it_back(memory: Memory, category: Category, other: Category) -> None:
     memory.categories.merge(category.id, other.id)
     first = memory.instances.of(other.id)[0]
     memory.instances.forget(other.id, first.id)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import socket
 import sys
+from importlib.metadata import version
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -14,6 +15,7 @@ from typer.testing import CliRunner, Result
 import core.backbones
 from clients.cli import app, doctor
 from clients.cli.doctor import Finding, State
+from core.backbones.weights import FOLDER_NAME
 from core.errors import Unavailable
 from service.settings import Settings
 from store.memory import Memory
@@ -24,17 +26,11 @@ def machine(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Weights that are there at once, a memory's folder and a port of its own."""
     monkeypatch.setenv("ONELOOK_DATA_DIR", str(tmp_path / "memory"))
     monkeypatch.setenv("ONELOOK_CACHE", str(tmp_path / "cache"))
-    (tmp_path / "cache" / doctor_weights()).mkdir(parents=True)
+    (tmp_path / "cache" / FOLDER_NAME).mkdir(parents=True)
     monkeypatch.setattr(core.backbones, "load_backbone", lambda name: SimpleNamespace(name=name, fingerprint="0123456789abcdef"))
     with socket.create_server(("127.0.0.1", 0)) as taken:
         free = taken.getsockname()[1]
     monkeypatch.setenv("ONELOOK_PORT", str(free))
-
-
-def doctor_weights() -> str:
-    from core.backbones.weights import FOLDER_NAME
-
-    return FOLDER_NAME
 
 
 def run(*words: str) -> Result:
@@ -161,7 +157,7 @@ def test_what_is_no_name_of_a_host_is_told(monkeypatch: pytest.MonkeyPatch) -> N
 def test_the_service_itself_on_its_port(url: str) -> None:
     found = doctor.port(Settings(port=int(url.rpartition(":")[2])))
     assert found.state is State.good
-    assert "OneLook 0.1.0 answers" in found.found
+    assert f"OneLook {version('onelook')} answers" in found.found
 
 
 def test_free_memory_is_told_in_bytes_by_the_thousand(monkeypatch: pytest.MonkeyPatch) -> None:

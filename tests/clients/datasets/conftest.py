@@ -21,6 +21,8 @@ SIZE = (48, 64)
 K = np.array([[70.0, 0, 30.5], [0, 72.0, 25.5], [0, 0, 1]])
 BALL = np.array([0.4, -0.2, 0.7])
 RADIUS = 0.3
+CLOUD = BALL + np.random.default_rng(0).uniform(-0.5, 0.5, (4000, 3)) * [0.2, 0.4, 0.6]
+"""Points of a box about the ball's middle, shape (4000, 3)."""
 
 
 @dataclass(frozen=True, eq=False)

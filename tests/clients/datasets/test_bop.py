@@ -15,7 +15,8 @@ from clients.datasets import bop
 from clients.datasets.folders import load_burst
 from core.errors import InvalidInput
 
-BALL = np.array([0.4, -0.2, 0.7])
+from .conftest import BALL
+
 DEPTH_SCALE = 0.1
 """Millimetres a unit, as in several of the benchmark's data sets."""
 MODEL = {

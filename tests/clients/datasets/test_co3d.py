@@ -12,13 +12,13 @@ import pytest
 
 from clients.datasets import co3d
 from clients.datasets.folders import load_burst
+from clients.pose_error import pose_error
 from core.errors import InvalidInput
 from core.sim3 import Sim3
 
 from .co3d_format import label, write_annotations, write_sequence
+from .conftest import BALL, CLOUD, SIZE
 
-SIZE = (48, 64)
-BALL = np.array([0.4, -0.2, 0.7])
 LABEL = np.array([[0.0, -1, 0, 0.2], [1, 0, 0, -0.1], [0, 0, 1, 0.3], [0, 0, 0, 1]])
 """A quarter turn about z and a shift, from the world of sequence 1_2_3 to that of 4_5_6."""
 
@@ -26,10 +26,9 @@ LABEL = np.array([[0.0, -1, 0, 0.2], [1, 0, 0, -0.1], [0, 0, 1, 0.3], [0, 0, 0, 
 @pytest.fixture(params=["ndc_norm_image_bounds", "ndc_isotropic"], ids=["version 1", "version 2"])
 def root(request: pytest.FixtureRequest, tmp_path: Path, shots: list[Any]) -> Path:
     """A data set of one category with two sequences."""
-    cloud = BALL + np.random.default_rng(0).uniform(-0.5, 0.5, (4000, 3)) * [0.2, 0.4, 0.6]
     names = ("1_2_3", "4_5_6")
     write_annotations(
-        tmp_path, "cup", [each for name in names for each in write_sequence(tmp_path, "cup", name, shots, cloud, request.param)]
+        tmp_path, "cup", [each for name in names for each in write_sequence(tmp_path, "cup", name, shots, CLOUD, request.param)]
     )
     return tmp_path
 
@@ -132,8 +131,6 @@ def test_a_labels_rotation_must_be_one(root: Path) -> None:
 
 
 def test_the_truth_scores_itself_as_perfect(root: Path) -> None:
-    from clients.pose_error import pose_error
-
     label(root, "cup", "1_2_3", "1_2_3", np.eye(4))
     label(root, "cup", "4_5_6", "1_2_3", LABEL)
     first, second = (each.world_from_model for each in co3d.find_sequences(root))

@@ -17,16 +17,14 @@ from clients.datasets.convert import convert
 from core.errors import InvalidInput
 
 from .co3d_format import label, write_annotations, write_sequence
-
-BALL = np.array([0.4, -0.2, 0.7])
+from .conftest import CLOUD
 
 
 @pytest.fixture
 def source(tmp_path: Path, shots: list[Any]) -> list[folders.Sequence]:
     """A labelled sequence of CO3D."""
-    cloud = BALL + np.random.default_rng(0).uniform(-0.5, 0.5, (4000, 3)) * [0.2, 0.4, 0.6]
     root = tmp_path / "co3d"
-    write_annotations(root, "cup", write_sequence(root, "cup", "1_2_3", shots, cloud, "ndc_isotropic"))
+    write_annotations(root, "cup", write_sequence(root, "cup", "1_2_3", shots, CLOUD, "ndc_isotropic"))
     label(root, "cup", "1_2_3", "1_2_3", np.eye(4))
     return co3d.find_sequences(root)
 
