@@ -70,7 +70,7 @@ class BopReader(folders.Reader):
             depth_m = read_depth(depth_file, float(folders.read_numbers(entry, "depth_scale", (), within)) / 1000)
         mask = read_mask(mask_file) if (masks or not sight.alone) and mask_file.exists() else None
         camera_from_model = _camera_from_model(scene, sight, truth)
-        return View(read_rgb(sight.image), depth_m, _camera(entry, camera_from_model, within), mask)
+        return folders.view_of(sight.image, read_rgb(sight.image), depth_m, _camera(entry, camera_from_model, within), mask)
 
 
 def find_sequences(root: Path) -> list[folders.Sequence]:
@@ -86,13 +86,15 @@ def find_sequences(root: Path) -> list[folders.Sequence]:
 def _scene(scene: Path, root: Path, models: Mapping[str, Mapping[str, Any]]) -> list[folders.Sequence]:
     truth, cameras = folders.read_json(scene / TRUTH), folders.read_json(scene / CAMERAS)
     colour = next((scene / name for name in ("rgb", "gray") if (scene / name).is_dir()), None)
-    images = {str(int(path.stem)): path for path in sorted(colour.iterdir()) if is_image(path)} if colour else {}
+    images = {folders.key_of(path): path for path in sorted(colour.iterdir()) if is_image(path)} if colour else {}
     sights: dict[tuple[int, int], list[Sight]] = {}
     for key in sorted(truth.keys() & images.keys() & cameras.keys(), key=int):
         seen: dict[int, int] = {}
-        for index, entry in enumerate(truth[key]):
-            copy = seen[entry["obj_id"]] = seen.get(entry["obj_id"], -1) + 1
-            sights.setdefault((entry["obj_id"], copy), []).append(Sight(images[key], key, index, len(truth[key]) == 1))
+        annotated = folders.read_list(truth, key, f"{scene / TRUTH}: ")
+        for index, entry in enumerate(annotated):
+            number = int(folders.read_numbers(entry, "obj_id", (), f"{scene / TRUTH}: {key}[{index}]."))
+            copy = seen[number] = seen.get(number, -1) + 1
+            sights.setdefault((number, copy), []).append(Sight(images[key], key, index, len(annotated) == 1))
     place = "-".join(scene.relative_to(root).parts) or scene.name
     return [
         _sequence(scene, f"{place}-{copy}" if (number, 1) in sights else place, number, found, models)

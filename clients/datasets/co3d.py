@@ -93,7 +93,9 @@ class Co3dReader(folders.Reader):
         if rgb.shape[:2] != frame.size:
             raise InvalidInput(str(self.root / frame.image), f"is {rgb.shape[:2]} pixels (H, W); its annotation says {frame.size}")
         mask = read_mask(self.root / frame.mask, FOREGROUND) if masks and frame.mask else None
-        return View(rgb, self._depth(frame), frame.camera, mask if mask is not None and mask.any() else None)
+        return folders.view_of(
+            self.root / frame.image, rgb, self._depth(frame), frame.camera, mask if mask is not None and mask.any() else None
+        )
 
     def _depth(self, frame: Frame) -> NDArray[np.float32] | None:
         """In the image's size; None where the frame has none, or where no pixel of it is consistent with other frames."""

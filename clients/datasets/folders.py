@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from clients.datasets.images import is_image, read_depth, read_mask, read_rgb
 from core.errors import InvalidInput
@@ -129,10 +130,10 @@ def folders_below(root: Path) -> Iterator[tuple[Path, list[str]]]:
 
 def _load_view(sequence: Sequence, image: Path, cameras: dict[str, Any], masks: bool) -> View:
     rgb = read_rgb(image)
-    key = _number(image) if cameras else ""
+    key = key_of(image) if cameras else ""
     entry = cameras.get(key)
     if entry is None or "cam_R_w2c" not in entry:
-        return View(rgb)
+        return view_of(image, rgb)
     within = f"{sequence.path / CAMERAS}: {key}."
     depth_file = sequence.path / "depth" / f"{image.stem}.png"
     depth_m = None
@@ -140,11 +141,25 @@ def _load_view(sequence: Sequence, image: Path, cameras: dict[str, Any], masks: 
         depth_m = read_depth(depth_file, float(read_numbers(entry, "depth_scale", (), within)) / 1000)
     mask_file = sequence.path / "mask_visib" / f"{image.stem}_000000.png"
     mask = read_mask(mask_file) if masks and mask_file.exists() else None
-    return View(rgb, depth_m, read_camera(entry, within), mask)
+    return view_of(image, rgb, depth_m, read_camera(entry, within), mask)
 
 
-def _number(image: Path) -> str:
-    """What an image is called by in the scene's files."""
+def view_of(
+    image: Path,
+    rgb: NDArray[np.uint8],
+    depth_m: NDArray[np.float32] | None = None,
+    camera: Camera | None = None,
+    mask: NDArray[np.bool_] | None = None,
+) -> View:
+    """The view of an image file. Raises InvalidInput, naming that file, where its parts do not go together."""
+    try:
+        return View(rgb, depth_m, camera, mask)
+    except InvalidInput as error:
+        raise InvalidInput(f"{image}: {error.field.removeprefix('view.')}", error.message) from None
+
+
+def key_of(image: Path) -> str:
+    """What an image is called by in the scene's files. Raises InvalidInput where its name is no number."""
     if not (image.stem.isascii() and image.stem.isdecimal()):
         raise InvalidInput(str(image), f"expected a number for a name, such as 000000{image.suffix}: by it {CAMERAS} tells its camera")
     return str(int(image.stem))
@@ -174,7 +189,16 @@ def read_numbers(entry: Mapping[str, Any], name: str, shape: tuple[int, ...], wi
     except (KeyError, TypeError, ValueError):
         count = math.prod(shape)
         expected = f"{count} numbers, row by row" if count > 1 else "a number"
-        raise InvalidInput(f"{within}{name}", f"expected {expected}, found {entry.get(name)!r:.80}") from None
+        found = entry.get(name) if isinstance(entry, Mapping) else entry
+        raise InvalidInput(f"{within}{name}", f"expected {expected}, found {found!r:.80}") from None
+
+
+def read_list(entry: Mapping[str, Any], name: str, within: str) -> list[Any]:
+    """An entry's list, empty where there is none. Raises as `read_numbers` does."""
+    found = entry.get(name) or []
+    if not isinstance(found, list):
+        raise InvalidInput(f"{within}{name}", f"expected a list, found {found!r:.80}")
+    return found
 
 
 def _read_sequence(folder: Path) -> Sequence:
@@ -182,10 +206,10 @@ def _read_sequence(folder: Path) -> Sequence:
     for name in ("category", "instance"):
         if not isinstance(about.get(name), str):
             raise InvalidInput(f"{folder / ABOUT}: {name}", f"expected a name, found {about.get(name)!r:.80}")
-    if not (folder / "rgb").is_dir():
-        raise InvalidInput(str(folder), f"has no folder rgb; expected its images there, beside {ABOUT}")
-    images = tuple(sorted(path for path in (folder / "rgb").iterdir() if is_image(path)))
-    listed = enumerate(about.get("symmetries") or ())
+    images = tuple(sorted(path for path in (folder / "rgb").glob("*") if is_image(path)))
+    if not images:
+        raise InvalidInput(str(folder), f"has no folder rgb with images in it; expected it beside {ABOUT}")
+    listed = enumerate(read_list(about, "symmetries", f"{folder / ABOUT}: "))
     symmetries = tuple(read_symmetry(matrix, f"{folder / ABOUT}: symmetries[{index}]") for index, matrix in listed)
     longest_mm = read_numbers(about, "longest_side_mm", (), f"{folder / ABOUT}: ") if about.get("longest_side_mm") else None
     return Sequence(
@@ -218,7 +242,7 @@ def _world_from_model(folder: Path, about: dict[str, Any]) -> Sim3 | None:
     first = next((key for key in truth if truth[key] and key in cameras), None)
     if first is None:
         return None
-    pose, within = truth[first][0], f"{folder / TRUTH}: {first}[0]."
+    pose, within = read_list(truth, first, f"{folder / TRUTH}: ")[0], f"{folder / TRUTH}: {first}[0]."
     camera = read_camera(cameras[first], f"{folder / CAMERAS}: {first}.")
     camera_from_model = Sim3(
         float(read_numbers(about, "model_scale_mm", (), f"{folder / ABOUT}: ")) / 1000,

@@ -16,7 +16,7 @@ class PhotographReader(folders.Reader):
 
     def read(self, sequence: folders.Sequence, indices: Sequence[int], masks: bool) -> list[View]:
         """See `folders.Reader`."""
-        return [View(read_rgb(sequence.images[index])) for index in indices]
+        return [folders.view_of(image, read_rgb(image)) for image in (sequence.images[index] for index in indices)]
 
     def files(self, sequence: folders.Sequence) -> list[Path]:
         """See `folders.Reader`."""

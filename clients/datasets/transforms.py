@@ -26,7 +26,7 @@ AXES = np.diag([1.0, -1.0, -1.0, 1.0])
 """Between OpenGL's camera axes and OpenCV's, in either direction."""
 DISTORTION = ("k1", "k2", "p1", "p2", "k3")
 """In OpenCV's order."""
-PINHOLES = frozenset({"OPENCV", "PINHOLE", "SIMPLE_PINHOLE"})
+PINHOLES = ("OPENCV", "PINHOLE", "SIMPLE_PINHOLE")
 MILLIMETRES = 0.001
 """nerfstudio's depth, where the file does not say."""
 
@@ -90,8 +90,8 @@ def _image(folder: Path, name: str, field: str) -> Path:
 def _view(folder: Path, image: Path, frame: Mapping[str, Any], masks: bool, within: str) -> View:
     """`frame` has the scene's fields, too, where it has none of its own."""
     rgb, mask = read_rgba(image)
-    if frame.get("mask_path"):
-        mask = read_mask(folder / frame["mask_path"])
+    if masks and (name := _file_name(frame, "mask_path", within)):
+        mask = read_mask(folder / name)
     K, distortion = _intrinsics(frame, (rgb.shape[0], rgb.shape[1]), within)
     depth_m = _depth(folder, frame, (rgb.shape[0], rgb.shape[1]), within)
     if any(distortion):
@@ -100,7 +100,8 @@ def _view(folder: Path, image: Path, frame: Mapping[str, Any], masks: bool, with
     given = frame.get("transform_matrix")
     rows = 3 if isinstance(given, list) and len(given) == 3 else 4  # some leave out the last
     pose[:3] = folders.read_numbers(frame, "transform_matrix", (rows, 4), within)[:3]
-    return View(rgb, depth_m, folders.camera_of(K, pose @ AXES, within), mask if masks and mask is not None and mask.any() else None)
+    camera = folders.camera_of(K, pose @ AXES, within)
+    return folders.view_of(image, rgb, depth_m, camera, mask if masks and mask is not None and mask.any() else None)
 
 
 def _intrinsics(frame: Mapping[str, Any], size: tuple[int, int], within: str) -> tuple[FloatArray, tuple[float, ...]]:
@@ -111,7 +112,7 @@ def _intrinsics(frame: Mapping[str, Any], size: tuple[int, int], within: str) ->
 
     model = frame.get("camera_model", "OPENCV")
     if model not in PINHOLES:
-        raise InvalidInput(f"{within}camera_model", f"expected one of {', '.join(sorted(PINHOLES))}, found {model!r}; undistort the images")
+        raise InvalidInput(f"{within}camera_model", f"expected one of {', '.join(PINHOLES)}, found {model!r}; undistort the images")
     height, width = size
     calibrated = given("w") if "w" in frame else width
     if calibrated <= 0:
@@ -131,9 +132,12 @@ def _intrinsics(frame: Mapping[str, Any], size: tuple[int, int], within: str) ->
 
 
 def _depth_name(frame: Mapping[str, Any], within: str) -> str | None:
-    name = frame.get("depth_file_path") or frame.get("depth_path")
+    return _file_name(frame, "depth_file_path", within) or _file_name(frame, "depth_path", within)
+
+
+def _file_name(frame: Mapping[str, Any], field: str, within: str) -> str | None:
+    name = frame.get(field)
     if name is not None and not isinstance(name, str):
-        field = "depth_file_path" if "depth_file_path" in frame else "depth_path"
         raise InvalidInput(f"{within}{field}", f"expected the name of a file, found {name!r:.80}")
     return name
 

@@ -126,6 +126,7 @@ def test_linked_folders_are_followed_once(root: Path) -> None:
         ("scene_gt.json", lambda scene: scene["0"][0].pop("cam_t_m2c"), "0[0].cam_t_m2c"),
         ("scene_gt.json", lambda scene: scene["0"][0]["cam_R_m2c"].pop(), "0[0].cam_R_m2c"),
         ("scene_camera.json", lambda scene: scene["0"].pop("depth_scale"), "0.depth_scale"),
+        ("scene_gt.json", lambda scene: scene["0"][0].pop("obj_id"), "0[0].obj_id"),
     ],
 )
 def test_what_is_wrong_with_a_scene_is_named(root: Path, file: str, change: Callable[[Any], object], field: str) -> None:
@@ -136,6 +137,14 @@ def test_what_is_wrong_with_a_scene_is_named(root: Path, file: str, change: Call
     with pytest.raises(InvalidInput, match="expected .*number") as caught:
         load_burst(bop.find_sequences(root)[0])
     assert caught.value.field == f"{path}: {field}"
+
+
+def test_an_image_without_a_number_is_named(root: Path) -> None:
+    images = root / "test" / "000001" / "rgb"
+    (images / "000000.png").rename(images / "first.png")
+    with pytest.raises(InvalidInput, match="expected a number for a name") as caught:
+        bop.find_sequences(root)
+    assert caught.value.field == str(images / "first.png")
 
 
 def test_a_folder_without_scenes_is_named(tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from clients.datasets.folders import Sequence, find_sequences, load_burst
-from clients.datasets.images import read_rgb
+from clients.datasets.images import read_rgb, write_image
 from core.errors import InvalidInput
 
 
@@ -103,6 +103,15 @@ def edit(file: str, change: Callable[[Any], object]) -> Callable[[Path], object]
             edit("scene_camera.json", lambda cameras: cameras["1"].pop("depth_scale")),
             "scene_camera.json: 1.depth_scale",
             "expected a number",
+        ),
+        (edit("scene_camera.json", lambda cameras: cameras.update({"0": 5})), "scene_camera.json: 0.cam_R_w2c", "expected 9 numbers"),
+        (edit("scene_gt.json", lambda truth: truth.update({"0": truth["0"][0]})), "scene_gt.json: 0", "expected a list"),
+        (edit("sequence.json", lambda about: about.update(symmetries=4)), "sequence.json: symmetries", "expected a list, found 4"),
+        (lambda folder: [image.unlink() for image in (folder / "rgb").iterdir()], "", "has no folder rgb with images"),
+        (
+            lambda folder: write_image(folder / "depth" / "000001.png", np.ones((40, 40), np.uint16)),
+            "rgb/000001.jpg: depth",
+            "align depth to colour",
         ),
     ],
 )

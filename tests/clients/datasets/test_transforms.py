@@ -184,6 +184,15 @@ def test_what_is_wrong_with_a_frame_is_named_by_its_place_in_the_file(
     assert caught.value.field == f"{file}: {field}"
 
 
+def test_a_silhouette_is_looked_for_only_when_it_is_asked_for(tmp_path: Path, shots: list[Any]) -> None:
+    write(tmp_path / "a", shots, INTRINSICS, lambda n, shot: {"mask_path": "masks/lost.png"})
+    (sequence,) = transforms.find_sequences(tmp_path / "a")
+    assert len(load_burst(sequence)) == len(shots)
+    with pytest.raises(InvalidInput, match="is no file") as caught:
+        load_burst(sequence, masks=True)
+    assert caught.value.field == str(tmp_path / "a" / "masks" / "lost.png")
+
+
 def test_the_files_of_a_sequence_need_depth_that_has_a_name(tmp_path: Path, shots: list[Any]) -> None:
     write(tmp_path / "a", shots, INTRINSICS, lambda n, shot: {"depth_path": 3})
     (sequence,) = transforms.find_sequences(tmp_path / "a")
