@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from datetime import timedelta
 from typing import Annotated
-from urllib.parse import urlsplit
 
 from fastapi import APIRouter, Form, Query, Request
 from fastapi.responses import RedirectResponse, Response
@@ -60,6 +59,5 @@ def end_session(request: Request, agent: AgentDep) -> Response:
 
 def own_address(address: str) -> str:
     """An address below this service; its first page in place of any other, so that no link to the sign-in leads away from here."""
-    parts = urlsplit(address)
-    own = address.startswith("/") and not parts.scheme and not parts.netloc and "\\" not in address and address.isprintable()
+    own = address.startswith("/") and not address.startswith("//") and "\\" not in address and address.isprintable()
     return address if own else "/"

@@ -223,6 +223,7 @@ CROSS_SITE = [
     {"Origin": "https://evil.example"},
     {"Origin": "null"},
     {"Origin": "http://testserver:81"},
+    {"Origin": "http://["},
 ]
 
 

@@ -118,7 +118,8 @@ def test_where_there_are_no_keys_there_is_nothing_to_sign_in_to(settings, backbo
 
 
 @pytest.mark.parametrize(
-    "address", ["https://evil.example", "//evil.example", "/\\evil.example", "javascript:alert(1)", "", "evil", "/\n/evil", "/\t/evil"]
+    "address",
+    ["https://evil.example", "//evil.example", "//[", "/\\evil.example", "javascript:alert(1)", "", "evil", "/\n/evil", "/\t/evil"],
 )
 def test_nobody_is_led_away(address):
     assert own_address(address) == "/"
