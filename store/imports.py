@@ -19,7 +19,7 @@ from store.archive import FILE_NAME, MANIFEST, CategoryEntry, InstanceEntry, Man
 from store.arrays import BLOB_TYPE, arrays_file, parts_from_blob
 from store.audit import record
 from store.bursts import read_burst
-from store.categories import insert_category
+from store.categories import Categories, insert_category
 from store.columns import sim3_from_json
 from store.connection import Connection, Row, new_id
 from store.folders import Files, FileSum
@@ -89,10 +89,8 @@ class _Judged:
     instances: list[Row]
 
 
-def import_archive(
-    connection: Connection, path: Path, existing: list[Category], *, actor: str | None, progress: Progress = untold
-) -> Import:
-    """See `Memory.import_archive`; `existing` are the memory's categories."""
+def import_archive(connection: Connection, categories: Categories, path: Path, *, actor: str | None, progress: Progress = untold) -> Import:
+    """See `Memory.import_archive`; `categories` are the memory's."""
     try:
         with untrusted.opened(path, path.name) as opened:
             entries = untrusted.entries(opened, path.stat().st_size)
@@ -102,7 +100,7 @@ def import_archive(
             for index, part in enumerate(manifest.categories):
                 _judge_entries(archive, part)
                 progress(index + 1, len(manifest.categories))
-            return _bring(connection, archive, existing, path.name, actor)
+            return _bring(connection, categories, archive, path.name, actor)
     except OSError as error:
         raise Unavailable(f"cannot read {path}: {error}") from error
 
@@ -156,8 +154,9 @@ def _judge_entries(archive: _Archive, part: CategoryEntry) -> None:
             untrusted.arrays(written, name)
 
 
-def _bring(connection: Connection, archive: _Archive, existing: list[Category], source: str, actor: str | None) -> Import:
-    manifest, duplicates = archive.manifest, _duplicates(archive.manifest, existing)
+def _bring(connection: Connection, categories: Categories, archive: _Archive, source: str, actor: str | None) -> Import:
+    manifest, existing = archive.manifest, categories.all()
+    duplicates = _duplicates(manifest, existing)
     known = {duplicate.archive_id for duplicate in duplicates}
     parts = [part for part in manifest.categories if part.id not in known]
     judged: dict[Path, _Judged] = {}
@@ -174,6 +173,8 @@ def _bring(connection: Connection, archive: _Archive, existing: list[Category], 
         return write
 
     def insert(db: Database, files: Mapping[Path, Files]) -> None:
+        if _duplicates(manifest, categories.all()) != duplicates:
+            raise Conflict("categories that are in the archive came, went or were renamed meanwhile; import it again")
         for key in ("backbone", "fingerprint"):  # an empty memory takes the archive's
             db.table("meta").insert({"key": key, "value": getattr(manifest, key)}, ignore=True)
         for folder, each in judged.items():

@@ -204,9 +204,9 @@ class Memory:
         """Takes the categories of another memory's export, all of them or none; those it has already are left as they are.
 
         `progress` counts categories. Raises InvalidInput where the archive is not in order, Conflict where it was made with another
-        backbone, Unavailable where it cannot be read or kept.
+        backbone or is imported meanwhile, Unavailable where it cannot be read or kept.
         """
-        result = import_archive(self._connection, path, self.categories.all(), actor=actor, progress=progress)
+        result = import_archive(self._connection, self.categories, path, actor=actor, progress=progress)
         seal(self._connection)  # an earlier version may have written it
         self.instances.reload()
         return result

@@ -15,6 +15,7 @@ from core.novelty import DecisionConfig, decide
 from core.reference import Reference
 from core.scores import SCORES
 from core.views import Burst
+from store.connection import before_change
 from store.memory import Memory
 from store.records import Category
 
@@ -84,6 +85,18 @@ def test_names_that_were_there_before_are_told(
 ) -> None:
     mine = second.categories.create(reference, burst, encoded, name="cup")
     assert [each.same_name for each in second.import_archive(archive).categories] == [(mine.id,), ()]
+
+
+def test_an_archive_that_comes_twice_at_once_is_taken_once(second: Memory, archive: Path) -> None:
+    def the_other() -> None:
+        before_change.reset(token)
+        second.import_archive(archive)
+
+    token = before_change.set(the_other)
+    with pytest.raises(Conflict, match="import it again"):
+        second.import_archive(archive)
+    assert [each.name for each in second.categories.all()] == ["cup", "mug"]
+    assert len(list(second.categories.root.iterdir())) == 2
 
 
 def test_a_deleted_category_may_come_again(second: Memory, archive: Path) -> None:
