@@ -5,6 +5,7 @@ from __future__ import annotations
 import zipfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,7 @@ from core.errors import Conflict, InvalidInput, OneLookError, Unavailable
 from core.evidence import PARTS
 from core.reference import Reference
 from store import untrusted
-from store.archive import FILE_NAME, MANIFEST, CategoryEntry, InstanceEntry, Manifest, token_name
+from store.archive import FILE_NAME, MANIFEST, CategoryEntry, GoalEntry, InstanceEntry, Manifest, token_name
 from store.arrays import BLOB_TYPE, arrays_file, parts_from_blob
 from store.audit import record
 from store.bursts import read_burst
@@ -200,6 +201,9 @@ def _judge_category(folder: Path, part: CategoryEntry, category_id: str, manifes
         name, _ = arrays_file(files)
         arrays = untrusted.arrays((folder / name).read_bytes(), name)
         burst, reference = read_burst(folder, files), Reference.from_arrays(arrays)
+        made: tuple[CategoryEntry | InstanceEntry | GoalEntry, ...] = (part, *part.instances, *part.goals)
+        for dated in made:
+            datetime.fromisoformat(dated.created_at)
         for goal in part.goals:
             sim3_from_json(goal.target_from_reference)
         _require(len(reference.views) == len(burst), "its reference has as many views as pictures")

@@ -289,25 +289,25 @@ def test_another_number_of_parts_is_refused(second: Memory, archive: Path, categ
     assert nothing_changed(second)
 
 
-def changes() -> dict[str, Callable[[dict], object]]:
-    return {
-        "another format": lambda manifest: manifest.update(format="else"),
-        "a later version": lambda manifest: manifest.update(version=3),
-        "nothing": lambda manifest: manifest.clear(),
-        "no categories": lambda manifest: manifest.update(categories=[]),
-        "a field nobody knows": lambda manifest: manifest.update(more=1),
-        "an id that is a path": lambda manifest: manifest["categories"][0].update(id="../x"),
-        "the same id twice": lambda manifest: manifest["categories"].append(manifest["categories"][0]),
-        "no instances": lambda manifest: manifest["categories"][0].update(instances=[]),
-        "an instance that came by magic": lambda manifest: manifest["categories"][0]["instances"][0].update(how="magic"),
-        "a goal that is no pose": lambda manifest: manifest["categories"][0]["goals"][0].update(target_from_reference="{}"),
-        "no arrays": lambda manifest: manifest["categories"][0]["files"].pop("reference.npz"),
-    }
+CHANGES: dict[str, Callable[[dict], object]] = {
+    "another format": lambda manifest: manifest.update(format="else"),
+    "a later version": lambda manifest: manifest.update(version=3),
+    "nothing": lambda manifest: manifest.clear(),
+    "no categories": lambda manifest: manifest.update(categories=[]),
+    "a field nobody knows": lambda manifest: manifest.update(more=1),
+    "an id that is a path": lambda manifest: manifest["categories"][0].update(id="../x"),
+    "the same id twice": lambda manifest: manifest["categories"].append(manifest["categories"][0]),
+    "no instances": lambda manifest: manifest["categories"][0].update(instances=[]),
+    "an instance that came by magic": lambda manifest: manifest["categories"][0]["instances"][0].update(how="magic"),
+    "a goal that is no pose": lambda manifest: manifest["categories"][0]["goals"][0].update(target_from_reference="{}"),
+    "no arrays": lambda manifest: manifest["categories"][0]["files"].pop("reference.npz"),
+    "a time that never was": lambda manifest: manifest["categories"][0].update(created_at="2026-02-30T12:00:00.000+00:00"),
+}
 
 
 def test_a_manifest_that_is_not_in_order_is_refused(second: Memory, archive: Path, tmp_path: Path) -> None:
     entries = unpacked(archive)
-    for kind, change in changes().items():
+    for kind, change in CHANGES.items():
         with pytest.raises(InvalidInput, match="archive"):
             second.import_archive(packed(tmp_path / "evil.zip", with_manifest(entries, change)))
         assert nothing_changed(second), kind
