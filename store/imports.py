@@ -15,6 +15,7 @@ from sqlite_utils import Database
 from core.errors import Conflict, InvalidInput, OneLookError, Unavailable
 from core.evidence import PARTS
 from core.reference import Reference
+from core.sim3 import Sim3
 from store import untrusted
 from store.archive import FILE_NAME, MANIFEST, CategoryEntry, GoalEntry, InstanceEntry, Manifest, token_name
 from store.arrays import BLOB_TYPE, arrays_file, parts_from_blob
@@ -205,7 +206,8 @@ def _judge_category(folder: Path, part: CategoryEntry, category_id: str, manifes
         for dated in made:
             datetime.fromisoformat(dated.created_at)
         for goal in part.goals:
-            sim3_from_json(goal.target_from_reference)
+            pose = Sim3.from_matrix(sim3_from_json(goal.target_from_reference).as_matrix())
+            _require(bool(np.isfinite(pose.translation).all()), "its goals are somewhere")
         _require(len(reference.views) == len(burst), "its reference has as many views as pictures")
         _require(reference.fingerprint == manifest.fingerprint, "its reference was made with the archive's backbone")
         _require(reference.box.extent_m.shape == (3,), "its box has three edges")

@@ -19,44 +19,8 @@ from core.evidence import merged, part_tokens
 from store.folders import FileSum
 from store.memory import Memory
 from store.records import Category
-
-from .conftest import DIM, VIEWS
-
-Entries = dict[str, bytes]
-
-
-def unpacked(archive: Path) -> Entries:
-    with zipfile.ZipFile(archive) as file:
-        return {name: file.read(name) for name in file.namelist()}
-
-
-def packed(path: Path, entries: Entries, method: int = zipfile.ZIP_STORED) -> Path:
-    with zipfile.ZipFile(path, "w", method) as file:
-        for name, content in entries.items():
-            file.writestr(name, content)
-    return path
-
-
-def with_manifest(entries: Entries, change: Callable[[dict], object]) -> Entries:
-    """The same archive with another manifest."""
-    manifest = json.loads(entries["manifest.json"])
-    change(manifest)
-    return entries | {"manifest.json": json.dumps(manifest).encode()}
-
-
-def with_entry(entries: Entries, name: str, content: bytes) -> Entries:
-    """The same archive with another entry, of which the manifest tells the truth."""
-    _, category_id, file = (*name.split("/"), "")[:3]
-
-    def tell(manifest: dict) -> None:
-        about = {"size": len(content), "sha256": FileSum.of(content).sha256}
-        for part in manifest["categories"]:
-            if name == f"tokens/{part['id']}.npz":
-                part["tokens"] = about
-            elif part["id"] == category_id:
-                part["files"][file] = about
-
-    return with_manifest(entries | {name: content}, tell)
+from tests.store.archives import Entries, npz, packed, unpacked, with_entry, with_manifest
+from tests.store.conftest import DIM, VIEWS
 
 
 def nothing_changed(memory: Memory) -> bool:
@@ -101,9 +65,8 @@ def test_links_folders_and_devices_are_refused(second: Memory, archive: Path, tm
 
 
 def test_compressed_entries_are_refused_unread(second: Memory, archive: Path, tmp_path: Path) -> None:
-    bomb = unpacked(archive) | {"bomb": bytes(50_000_000)}
     with pytest.raises(InvalidInput, match="compressed"):
-        second.import_archive(packed(tmp_path / "evil.zip", bomb, zipfile.ZIP_DEFLATED))
+        second.import_archive(packed(tmp_path / "evil.zip", unpacked(archive) | {"bomb": bytes(50_000_000)}, zipfile.ZIP_DEFLATED))
     assert nothing_changed(second)
 
 
@@ -137,8 +100,7 @@ def test_one_changed_bit_is_noticed(second: Memory, archive: Path, tmp_path: Pat
 
 
 def test_a_zip_file_without_a_manifest_is_refused(second: Memory, archive: Path, tmp_path: Path) -> None:
-    entries = unpacked(archive)
-    del entries["manifest.json"]
+    entries = {name: content for name, content in unpacked(archive).items() if name != "manifest.json"}
     with pytest.raises(InvalidInput, match="onelook memory export"):
         second.import_archive(packed(tmp_path / "evil.zip", entries))
     assert nothing_changed(second)
@@ -147,12 +109,6 @@ def test_a_zip_file_without_a_manifest_is_refused(second: Memory, archive: Path,
 def test_a_missing_archive_is_named(second: Memory, tmp_path: Path) -> None:
     with pytest.raises(Unavailable, match=r"none\.zip"):
         second.import_archive(tmp_path / "none.zip")
-
-
-def npz(**arrays: np.ndarray) -> bytes:
-    buffer = io.BytesIO()
-    np.savez(buffer, **arrays)
-    return buffer.getvalue()
 
 
 def npy_of(header: str, data: bytes) -> bytes:
@@ -289,6 +245,13 @@ def test_another_number_of_parts_is_refused(second: Memory, archive: Path, categ
     assert nothing_changed(second)
 
 
+POSE = '{"scale": 1, "rotation": [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "translation": [0, 0, 0.5]}'
+
+
+def goal(manifest: dict, pose: str) -> None:
+    manifest["categories"][0]["goals"][0].update(target_from_reference=pose)
+
+
 CHANGES: dict[str, Callable[[dict], object]] = {
     "another format": lambda manifest: manifest.update(format="else"),
     "a later version": lambda manifest: manifest.update(version=3),
@@ -299,7 +262,9 @@ CHANGES: dict[str, Callable[[dict], object]] = {
     "the same id twice": lambda manifest: manifest["categories"].append(manifest["categories"][0]),
     "no instances": lambda manifest: manifest["categories"][0].update(instances=[]),
     "an instance that came by magic": lambda manifest: manifest["categories"][0]["instances"][0].update(how="magic"),
-    "a goal that is no pose": lambda manifest: manifest["categories"][0]["goals"][0].update(target_from_reference="{}"),
+    "a goal that is no pose": lambda manifest: goal(manifest, "{}"),
+    "a goal that stretches": lambda manifest: goal(manifest, POSE.replace("[0, 0, 1]", "[0, 0, 2]")),
+    "a goal that is nowhere": lambda manifest: goal(manifest, POSE.replace("0.5", "Infinity")),
     "no arrays": lambda manifest: manifest["categories"][0]["files"].pop("reference.npz"),
     "a time that never was": lambda manifest: manifest["categories"][0].update(created_at="2026-02-30T12:00:00.000+00:00"),
 }
