@@ -29,7 +29,7 @@ from clients.pose_error import NO_POSE, PoseError, accuracy, median, pose_error,
 from core.backbones import load_backbone
 from core.boxes import remove_outliers
 from core.encode import EncodedBurst, Encoder
-from core.errors import NoPose
+from core.errors import InvalidInput, NoPose
 from core.sim3 import Sim3
 from core.views import FloatArray
 
@@ -164,7 +164,7 @@ def solve(job: Job) -> JobResult:
         started = time.perf_counter()
         try:
             found = way.find(kept, target, job.seed)
-        except NoPose:
+        except (NoPose, InvalidInput):  # nothing fits, or the views show nothing of the object
             found = None
         solve_ms.append(1000 * (time.perf_counter() - started))
         scores.append(_score(found, job, sequence))

@@ -7,12 +7,13 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
 from benchmarks import pose
 from benchmarks.contenders import Setting, Sweep, contender
-from benchmarks.pairs import ViewCounts
+from benchmarks.pairs import ViewCounts, choose_views
 from clients.datasets.folders import find_sequences
 from clients.pose_error import NO_POSE, PoseError
 from core.errors import InvalidInput, NoPose
@@ -125,6 +126,14 @@ def test_a_refused_pose_counts_as_180(recorded: Path, tmp_path: Path, monkeypatc
     (row, _) = run(recorded, Sweep(["ucd"], ["4"]), 1, tmp_path / "pose.json")
     assert (row.acc30, row.median_deg) == (0, 180)
     assert json.loads((tmp_path / "pose.json").read_text())["rows"][0]["median_t"] is None
+
+
+def test_a_target_in_whose_views_nothing_is_found_counts_as_180(recorded: Path) -> None:
+    (black,) = choose_views("egg/small", "target", 4, 1, 0)
+    file = recorded / "egg" / "small" / "rgb" / f"{black:06}.png"
+    cv2.imwrite(str(file), np.zeros_like(cv2.imread(str(file))))
+    row, _ = run(recorded, Sweep(["ucd"], ["4+1"]), 2, None)
+    assert (row.pairs, row.answered) == (2, 50)
 
 
 def test_a_setting_that_is_named_twice_is_run_once(recorded: Path) -> None:
