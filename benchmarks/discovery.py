@@ -35,7 +35,6 @@ from core.backbones import load_backbone
 from core.backbones.whitening import Whitening
 from core.calibration import Prior
 from core.encode import EncodedBurst, Encoder
-from core.errors import InvalidInput
 from core.scores import BEST, SCORES, require_score
 from core.views import FloatArray
 
@@ -123,9 +122,6 @@ def run(
         require_score(score)
     sequences = find_sequences(data)
     labels = labels_of(sequences)
-    objects = np.bincount(labels)
-    if len(objects) < 2 or objects.max() < 2:
-        raise InvalidInput("data", "discovery needs two categories, and two objects of one of them")
     network = load_backbone(backbone)
     tables = _all_tables(encode_all(sequences, Encoder(network)), network.whitening, scores, poses)
     started = time.perf_counter()
@@ -137,7 +133,7 @@ def run(
         "episodes": episodes,
         "length": length,
         "sequences": len(sequences),
-        "categories": len(objects),
+        "categories": int(labels.max()) + 1,
         "backbone": network.name,
         "fingerprint": network.fingerprint,
         "hardest": None if found.hardest is None else sequences[found.hardest].name,

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from benchmarks.pair_scores import PairScores
 from benchmarks.parallel import bar
 from clients.datasets import folders
+from core.errors import InvalidInput
 from core.views import FloatArray
 
 MOST_CATEGORIES, MOST_SEQUENCES = 20, 10
@@ -186,8 +187,17 @@ def nearest_category(source: Source, labels: NDArray[np.intp]) -> float:
 
 
 def labels_of(sequences: Sequence[folders.Sequence]) -> NDArray[np.intp]:
-    """The true category of each burst as a number from 0 on, shape (N,)."""
-    return np.unique([sequence.category for sequence in sequences], return_inverse=True)[1]
+    """The true category of each burst as a number from 0 on, shape (N,).
+
+    Raises InvalidInput where there are not two, and two objects of one of them: nothing could be told apart.
+    """
+    labels = np.unique([sequence.category for sequence in sequences], return_inverse=True)[1]
+    objects = np.bincount(labels)
+    if len(objects) < 2 or objects.max() < 2:
+        raise InvalidInput(
+            "data", f"expected two categories, and two objects of one of them; found {len(objects)} of {len(labels)} objects"
+        )
+    return labels
 
 
 def draw_orders(count: int, labels: NDArray[Any], length: int, seed: int) -> list[list[int]]:

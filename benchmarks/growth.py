@@ -14,6 +14,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from benchmarks.encoded import encode_all, read_views
+from benchmarks.episodes import labels_of
 from benchmarks.growth_plot import plot_growth
 from benchmarks.parallel import bar
 from benchmarks.synthetic_tokens import Levels, SyntheticTokens
@@ -112,7 +113,7 @@ def run(
         rounds: decisions timed at each size.
         exact_up_to: categories up to which the exact rule is computed as well, in time that grows with their number.
 
-    Raises InvalidInput where sizes do not grow, or the backbone ships no statistics.
+    Raises InvalidInput where sizes do not grow, the backbone ships no statistics, or `data` lacks two objects of a kind.
     """
     if list(categories) != sorted(set(categories)) or categories[0] < 1:
         raise InvalidInput("categories", f"expected growing numbers, found {', '.join(map(str, categories))}")
@@ -142,8 +143,9 @@ def synthetic_tokens(data: Path | None, backbone: str, seed: int) -> tuple[Synth
     if network.whitening is None:
         raise InvalidInput("backbone", f"{backbone} ships no statistics of its tokens to draw from; take {EMBEDDED}")
     sequences = find_sequences(data_or_samples(data))
+    labels = labels_of(sequences)
     files = encode_all(sequences, Encoder(network))
-    recorded = [(sequence.category, read_views(file)) for sequence, file in zip(sequences, files)]
+    recorded = [(str(label), read_views(file)) for label, file in zip(labels, files)]
     return SyntheticTokens.like(recorded, network.whitening, seed)
 
 

@@ -73,7 +73,8 @@ class SyntheticTokens:
         category = max(float(np.stack([bursts.mean(axis=0) for bursts in means.values()]).var(axis=0, ddof=1).sum()) - instance / 2, 0.0)
         within = np.concatenate([(each - each.mean(axis=1, keepdims=True)).reshape(-1, each.shape[2]) for _, each in parts])
         covariance = within.T @ within / len(within)
-        view = float(np.mean([each.mean(axis=1).var(axis=0, ddof=1).sum() for _, each in parts])) - float(np.trace(covariance)) / PARTS
+        views = [each.mean(axis=1).var(axis=0, ddof=1).sum() for _, each in parts if len(each) > 1]
+        view = (float(np.mean(views)) if views else 0.0) - float(np.trace(covariance)) / PARTS
         size = covariance.shape[0]
         made = SyntheticTokens(
             whitening,

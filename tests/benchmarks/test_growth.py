@@ -6,12 +6,13 @@ from collections.abc import Iterable
 from dataclasses import fields
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from benchmarks import growth
-from benchmarks.growth import GrowthRow, Probe
+from benchmarks.growth import GrowthRow, Probe, synthetic_tokens
 from benchmarks.synthetic_tokens import Levels, SyntheticTokens
 from clients.cli.bench_growth import exact_best, fill
 from core.backbones.whitening import Whitening
@@ -52,6 +53,20 @@ def test_shares_are_chosen_such_that_bursts_match_as_recorded() -> None:
     _, real, made = SyntheticTokens.like(recorded, WHITENING, seed=1)
     assert made.same == pytest.approx(real.same, abs=0.03)
     assert made.other == pytest.approx(real.other, abs=0.05)
+
+
+def test_a_burst_of_one_view_says_nothing_of_how_views_differ() -> None:
+    recorded = [(f"{category}", TOKENS.burst(category, instance, 6)) for category in range(8) for instance in range(2)]
+    _, real, made = SyntheticTokens.like([*recorded, ("0", TOKENS.burst(0, 2, 1))], WHITENING, seed=1)
+    assert made.same == pytest.approx(real.same, abs=0.03)
+
+
+def test_recordings_of_one_kind_are_refused(recorded: Path, small_world: Any, backbone: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    small_world(growth)
+    monkeypatch.setattr(backbone, "whitening", WHITENING)
+    with pytest.raises(InvalidInput, match="two categories") as caught:
+        synthetic_tokens(recorded, "colour", seed=0)
+    assert caught.value.field == "data"
 
 
 def test_each_size_is_asked_after_it_was_filled(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
