@@ -194,9 +194,7 @@ def labels_of(sequences: Sequence[folders.Sequence]) -> NDArray[np.intp]:
     labels = np.unique([sequence.category for sequence in sequences], return_inverse=True)[1]
     objects = np.bincount(labels)
     if len(objects) < 2 or objects.max() < 2:
-        raise InvalidInput(
-            "data", f"expected two categories, and two objects of one of them; found {len(objects)} of {len(labels)} objects"
-        )
+        raise InvalidInput("data", f"expected two categories, and two objects of one of them; {len(labels)} of {len(objects)} were found")
     return labels
 
 

@@ -22,6 +22,7 @@ from benchmarks.tables import print_table, report
 from clients.datasets.samples import data_or_samples
 from clients.datasets.sources import find_sequences
 from core.backbones import EMBEDDED, load_backbone
+from core.backbones.whitening import Whitening
 from core.encode import EncodedBurst, Encoder
 from core.errors import InvalidInput
 
@@ -42,6 +43,8 @@ class Probe:
     """Which categories these are, counted from the first learnt."""
     novel: EncodedBurst
     """Of none; the memory learns it in the end."""
+    whitening: Whitening
+    """That the tokens were drawn with."""
     rounds: int
     exact: bool
     """Whether the exact rule is computed too, which compares each burst with all members part by part."""
@@ -125,8 +128,8 @@ def run(
             progress.update(task, description=f"{count} categories")
             fill(Path(folder), (_told(tokens, each, views, lambda: progress.advance(task)) for each in range(before, count)))
             right = rng.integers(0, count, rounds).tolist()
-            asked = [tokens.burst(category, ASKED, views) for category in right]
-            rows.append(measure(Probe(Path(folder), asked, right, tokens.burst(10**9 + count, ASKED, views), rounds, count <= exact_up_to)))
+            asked, novel = [tokens.burst(category, ASKED, views) for category in right], tokens.burst(10**9 + count, ASKED, views)
+            rows.append(measure(Probe(Path(folder), asked, right, novel, tokens.whitening, rounds, count <= exact_up_to)))
             before = count
     meta = {"benchmark": "growth", "views": views, "rounds": rounds, "seed": seed}
     match = {"recorded": asdict(recorded), "synthetic": asdict(synthetic)}

@@ -49,12 +49,9 @@ def _measure(probe: Probe) -> GrowthRow:
     import numpy as np
 
     from benchmarks.growth import GrowthRow
-    from core.backbones import EMBEDDED
-    from core.backbones.whitening import Whitening
     from store.memory import Memory
 
-    whitening = Whitening.shipped(EMBEDDED)
-    decide = partial(_decide, whitening)
+    decide = partial(_decide, probe.whitening)
     with TemporaryDirectory() as folder, Memory.open(Path(folder)) as empty:  # loads what any decision needs
         _insert(Path(folder), [probe.novel])
         decide(empty, probe.novel)
@@ -70,8 +67,8 @@ def _measure(probe: Probe) -> GrowthRow:
         after = _resident_mb()
         categories = len(memory.instances.listed())
         nearest = _nearest_ms(memory, probe)
-        answers = _answers(memory, probe, [decision for _, decision in again], whitening)
-        few = memory.instances.enrolled(whitening).exact
+        answers = _answers(memory, probe, [decision for _, decision in again])
+        few = memory.instances.enrolled(probe.whitening).exact
         learnt = _learnt_ms(memory, probe, decide)
     times = [milliseconds for milliseconds, _ in again]
     return GrowthRow(
@@ -132,7 +129,7 @@ class _Answers:
     exact_spread: float | None = None
 
 
-def _answers(memory: Memory, probe: Probe, decisions: Sequence[Decision], whitening: Any) -> _Answers:
+def _answers(memory: Memory, probe: Probe, decisions: Sequence[Decision]) -> _Answers:
     import numpy as np
 
     members = memory.instances.listed()
@@ -140,7 +137,7 @@ def _answers(memory: Memory, probe: Probe, decisions: Sequence[Decision], whiten
     right = float(np.mean([each[0] == members[category].category_id for each, category in zip(found, probe.right)]))
     if not probe.exact:
         return _Answers(right)
-    exact = exact_best(memory, probe.known, whitening)
+    exact = exact_best(memory, probe.known, probe.whitening)
     return _Answers(
         right,
         recall=float(np.mean([each[0] == best[0] for each, best in zip(found, exact)])),

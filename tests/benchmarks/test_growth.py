@@ -87,6 +87,7 @@ def test_each_size_is_asked_after_it_was_filled(monkeypatch: pytest.MonkeyPatch,
     assert filled == [2, 3]
     assert [row.categories for row in rows] == [2, 5]
     assert [probe.exact for probe in probes] == [True, False]
+    assert all(probe.whitening is WHITENING for probe in probes)
     assert all(len(probe.known) == 3 and max(probe.right) < count for probe, count in zip(probes, (2, 5)))
     assert {file.name for file in tmp_path.iterdir()} == {"growth.json", "growth.png"}
     with pytest.raises(InvalidInput, match="growing"):
