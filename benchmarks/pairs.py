@@ -75,6 +75,15 @@ def require_views(sequences: Sequence[folders.Sequence], counts: Sequence[ViewCo
             raise InvalidInput("views", f"{most} were asked for, but {sequence.name} has {len(sequence.images)}; ask for fewer")
 
 
+def two_of_a_kind(sequences: Sequence[folders.Sequence], views: int) -> list[folders.Sequence]:
+    """The first two of one category that have so many views. Raises InvalidInput where there are none."""
+    for group in folders.by_category(sequences).values():
+        enough = [sequence for sequence in group if len(sequence.images) >= views]
+        if len(enough) > 1:
+            return enough[:2]
+    raise InvalidInput("data", f"no category has two objects of {views} or more views")
+
+
 def choose_views(name: str, role: str, available: int, count: int | None, seed: int) -> list[int]:
     """`count` of the `available` views of sequence `name`, ascending indices; None is all.
 

@@ -18,6 +18,7 @@ import numpy as np
 import torch
 
 from benchmarks import speed_plot, transformer_products, zero_shot_pose
+from benchmarks.pairs import two_of_a_kind
 from benchmarks.parallel import bar
 from benchmarks.tables import print_table, report
 from clients.datasets import folders
@@ -30,7 +31,6 @@ from core.backbones.whitening import Whitening
 from core.boxes import cloud_extent_m
 from core.depth import complete
 from core.encode import EncodedBurst, Encoder, EncoderConfig
-from core.errors import InvalidInput
 from core.matched_pair import MatchedPair
 from core.novelty import VERIFIED, Context, DecisionConfig, Member, decide
 from core.pose import VARIANTS, PoseConfig, PoseEstimator
@@ -95,7 +95,8 @@ def run(
 
     Raises InvalidInput where no category of `data` has two objects with so many views.
     """
-    reference_burst, target_burst = (folders.load_burst(each, range(views)) for each in _two_objects(data_or_samples(data), views))
+    objects = two_of_a_kind(find_sequences(data_or_samples(data)), views)
+    reference_burst, target_burst = (folders.load_burst(each, range(views)) for each in objects)
     network = load_backbone(backbone, device=device)
     exact = load_backbone(backbone, device=device, dtype=torch.float32)
     scanned = Encoder(network).encode(reference_burst)
@@ -262,11 +263,3 @@ def _megabytes(reference: Reference) -> float:
     file = BytesIO()
     np.savez(file, allow_pickle=False, **reference.as_arrays())
     return len(file.getvalue()) / 1e6
-
-
-def _two_objects(data: Path, views: int) -> list[folders.Sequence]:
-    for group in folders.by_category(find_sequences(data)).values():
-        enough = [sequence for sequence in group if len(sequence.images) >= views]
-        if len(enough) > 1:
-            return enough[:2]
-    raise InvalidInput("views", f"no category below {data} has two objects with {views} views")

@@ -20,6 +20,7 @@ import numpy as np
 from websockets.asyncio.client import ClientConnection, connect
 
 from benchmarks.load import teach
+from benchmarks.pairs import two_of_a_kind
 from benchmarks.parallel import bar
 from benchmarks.tables import report
 from clients.datasets import folders
@@ -28,7 +29,6 @@ from clients.datasets.sources import find_sequences
 from clients.errors import problem_from_json
 from clients.exchange import connection_to
 from clients.tracking import MAX_MESSAGE_BYTES, Conversation, websocket_url
-from core.errors import InvalidInput
 from core.views import View
 
 PATCH_PX = 14
@@ -101,7 +101,7 @@ def run(serve: Serve, json: Path | None, *, grids: Sequence[int], rate_hz: float
 
     `serve` starts a service of the benchmark's own: this package knows none. Raises InvalidInput where no category has two objects.
     """
-    taught, followed = _two_of_a_kind(data_or_samples(data))
+    taught, followed = two_of_a_kind(find_sequences(data_or_samples(data)), views=1)
     frames = folders.load_burst(followed).views
     rows = []
     with bar() as progress:
@@ -113,13 +113,6 @@ def run(serve: Serve, json: Path | None, *, grids: Sequence[int], rate_hz: float
     meta = {"benchmark": "track", "rate_hz": rate_hz, "seconds": seconds}
     report(f"Tracking, a camera at {rate_hz:.0f} Hz, {seconds:.0f} s each", rows, meta, json)
     return rows
-
-
-def _two_of_a_kind(data: Path) -> list[folders.Sequence]:
-    for group in folders.by_category(find_sequences(data)).values():
-        if len(group) > 1:
-            return group[:2]
-    raise InvalidInput("--data", f"no category below {data} has two objects: one teaches it, the other is followed")
 
 
 async def _follow(url: str, category_id: str, frames: Sequence[View], rate_hz: float, seconds: float) -> Stream:

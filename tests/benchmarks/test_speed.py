@@ -31,7 +31,7 @@ def test_every_stage_is_timed_and_drawn(recorded: Path, tmp_path: Path, monkeypa
 
 
 def test_two_objects_with_enough_views_are_needed(recorded: Path) -> None:
-    with pytest.raises(InvalidInput, match="5 views"):
+    with pytest.raises(InvalidInput, match="two objects of 5 or more views"):
         run(None, recorded, views=5, plot=None)
 
 

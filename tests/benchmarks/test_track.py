@@ -93,5 +93,5 @@ def test_a_service_that_goes_down_is_unreachable(recorded: Path) -> None:
 
 def test_a_kind_of_one_object_has_nothing_to_follow(recorded: Path) -> None:
     shutil.rmtree(recorded / "egg" / "small")
-    with pytest.raises(InvalidInput, match="one teaches it, the other is followed"):
+    with pytest.raises(InvalidInput, match="no category has two objects"):
         track.run(lambda memory, grid, warm: pytest.fail("nothing is to be served"), None, grids=[16], rate_hz=15, seconds=1, data=recorded)
