@@ -13,7 +13,6 @@ from core.errors import InvalidInput
 from core.views import Burst
 
 T = TypeVar("T")
-U = TypeVar("U")
 Body = Mapping[str, Any]
 """As httpx takes it: `json`, `files`, or `content` with its `headers`."""
 Direction = Sequence[float]
@@ -30,10 +29,6 @@ class Call(Generic[T]):
     """What the answer means."""
     params: Mapping[str, Any] = field(default_factory=dict)
     body: Body = field(default_factory=dict)
-
-    def then(self, wrap: Callable[[T], U]) -> Call[U]:
-        """The same request, whose answer is `wrap` of this one's."""
-        return Call(self.method, self.path, lambda response: wrap(self.read(response)), self.params, self.body)
 
 
 def given(**options: Any) -> dict[str, Any]:

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from clients.pose_error import PoseError
-from clients.robot import Observation
 from clients.simulator.waypoints import Waypoint
 from clients.simulator.world import WorldObject
 from core.sim3 import Sim3
@@ -87,7 +86,7 @@ class Encounter:
     founder_matrix: list[list[float]] | None
     """world_from_model of an object that founded a category, 4×4."""
     best_view: int
-    """Index in the burst of the view that tells most."""
+    """Index in the burst of the view in which most correspondences agree with the pose; 0 where there is no pose."""
     views: int
     """In the burst."""
     looks: int
@@ -157,8 +156,3 @@ def judge(outcome: str, category: str, founder: Founder | None, in_memory: bool)
     if outcome == "uncertain":
         return Verdict.UNDECIDED
     return Verdict.RECOGNISED if founder is not None and founder.category == category else Verdict.FALSE_KNOWN
-
-
-def best_view(seen: Observation) -> int:
-    """The view in which most correspondences agree with the pose; the first where there is no pose."""
-    return 0 if seen.pose is None else seen.pose.best_view

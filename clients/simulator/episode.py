@@ -16,7 +16,7 @@ from clients.errors import ClientError, NoObjectProblem
 from clients.pose_error import PoseError, pose_error
 from clients.robot import Observation, RobotClient
 from clients.simulator.arm import FREE, Arm, ArmConfig
-from clients.simulator.encounter import Encounter, Founder, Verdict, best_view, judge
+from clients.simulator.encounter import Encounter, Founder, Verdict, judge
 from clients.simulator.scanning import COULD_NOT, ScanReport, carry_out
 from clients.simulator.waypoints import Visit, visit_waypoints
 from clients.simulator.world import Subject, WorldObject
@@ -147,7 +147,7 @@ class Episode:
             learnt=learnt.id if learnt else None,
             learnt_views=learnt.views if learnt else 0,
             founder_matrix=thing.world_from_model.as_matrix().tolist() if learnt and thing.world_from_model else None,
-            best_view=best_view(seen),
+            best_view=0 if seen.pose is None else seen.pose.best_view,
             views=len(decided.burst),
             looks=decided.looks,
             offsets_deg=tuple(arm.offsets_deg),

@@ -30,9 +30,10 @@ def interrupted(file: Path, settings: Mapping[str, object]) -> list[str]:
 
     Raises ClientError where there was none, or it was of other settings.
     """
-    if not file.is_file():
+    lines = file.read_text(encoding="utf-8").splitlines() if file.is_file() else []
+    if not lines:
         raise ClientError(f"there is no run to resume in {file.parent}; leave out --resume")
-    written, *rest = file.read_text(encoding="utf-8").splitlines()
+    written, *rest = lines
     if json.loads(written) != json.loads(json.dumps(settings)):
         raise ClientError(f"the run in {file.parent} was of {written}; resume it with the same settings, or name another --out")
     return [line for line in rest if line.endswith("}")]

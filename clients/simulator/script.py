@@ -100,9 +100,10 @@ class Script:
         from clients.simulator.raycast.user_meshes import find_models
         from clients.simulator.raycast.world import RaycastSubject
 
+        settings = [each.name for each in fields(SensorConfig) if isinstance(each.default, float)]
         for name in self.faults.sensor:
-            if name not in {each.name for each in fields(SensorConfig)}:
-                raise InvalidInput(f"faults.sensor.{name}", f"is none of {', '.join(each.name for each in fields(SensorConfig))}")
+            if name not in settings:
+                raise InvalidInput(f"faults.sensor.{name}", f"is none of {', '.join(settings)}")
         sensor: SensorConfig = replace(SensorConfig(), **self.faults.sensor)  # type: ignore[arg-type]  # one type a setting
         if self.meshes is not None:
             models = find_models(Path(self.meshes))

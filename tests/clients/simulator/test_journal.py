@@ -46,5 +46,9 @@ def test_a_run_of_other_settings_is_not_gone_on_with(tmp_path: Path, settings: d
 
 
 def test_there_must_be_a_run_to_resume(tmp_path: Path) -> None:
+    file = tmp_path / "run.jsonl"
     with pytest.raises(ClientError, match="leave out --resume"):
-        interrupted(tmp_path / "run.jsonl", SETTINGS)
+        interrupted(file, SETTINGS)
+    file.touch()  # as a run leaves it that is killed before it has written its settings
+    with pytest.raises(ClientError, match="leave out --resume"):
+        interrupted(file, SETTINGS)

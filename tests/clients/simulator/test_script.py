@@ -88,8 +88,9 @@ def test_what_is_wrong_is_named(content: object, field: str) -> None:
 
 
 def test_unknown_settings_and_categories_are_named_when_objects_are_drawn() -> None:
-    with pytest.raises(InvalidInput, match=r"faults\.sensor\.fog"):
-        script_from({"faults": {"sensor": {"fog": 1}}}).subjects()
+    for name in ("fog", "size"):  # a size is two numbers, and settings are one each
+        with pytest.raises(InvalidInput, match=rf"faults\.sensor\.{name}: is none of focal_px"):
+            script_from({"faults": {"sensor": {name: 1}}}).subjects()
     with pytest.raises(InvalidInput, match="'unicorn' is none of"):
         Script(categories=("unicorn",)).subjects()
     with pytest.raises(InvalidInput, match="unicorn: not in the recordings"):

@@ -40,7 +40,7 @@ def wheel(radius: float, width: float, hub: tuple[float, float, float], y: float
 
 def car(rng: Generator) -> list[Mesh]:
     """A toy car, headlights to the front."""
-    length, width = 1.0, float(rng.uniform(0.4, 0.48))
+    width = float(rng.uniform(0.4, 0.48))
     radius = float(rng.uniform(0.095, 0.125))
     waist, roof = float(rng.uniform(0.24, 0.29)), float(rng.uniform(0.4, 0.52))
     paint = vivid(rng) if rng.uniform() < 0.75 else pick(rng, (*METALS, WHITE, BLACK))
@@ -57,7 +57,7 @@ def car(rng: Generator) -> list[Mesh]:
         (0.48, nose * 0.9, 0.92),
         (0.5, nose * 0.7, 0.8),
     ]
-    body = _sections(stations, width, floor, 0.05, length)
+    body = _sections(stations, width, floor)
     parts = [body.painted(mottled(paint, rng, 0.3, 0.03), 0.8)]
     front, rear = hood - float(rng.uniform(0.08, 0.16)), boot + float(rng.uniform(0.0, 0.14))
     cabin = [
@@ -67,7 +67,7 @@ def car(rng: Generator) -> list[Mesh]:
         (front, roof - 0.005, 0.77),
         (hood + 0.02, waist - 0.02, 0.88),
     ]
-    parts.append(_sections(cabin, width, waist - 0.06, 0.05, length, smooth=False).painted(_cabin(paint, waist, roof, rng), 0.8))
+    parts.append(_sections(cabin, width, waist - 0.06, smooth=False).painted(_cabin(paint, waist, roof, rng), 0.8))
     hub = pick(rng, METALS[:3])
     axles = (0.31, -0.3)
     for x in axles:
@@ -208,9 +208,7 @@ def sailboat(rng: Generator) -> list[Mesh]:
     return parts
 
 
-def _sections(
-    stations: list[tuple[float, float, float]], width: float, floor: float, radius: float, length: float, *, smooth: bool = True
-) -> Mesh:
+def _sections(stations: list[tuple[float, float, float]], width: float, floor: float, *, smooth: bool = True) -> Mesh:
     """A body of rounded rectangles across x: (x, height of the top, share of the width)."""
     given = np.array(stations)
     if smooth:
@@ -220,8 +218,8 @@ def _sections(
         along = np.stack([np.interp(at, np.arange(len(given)), given[:, column]) for column in range(3)], axis=1)
     rows = []
     for x, top, share in along:
-        outline = rounded_rectangle(width * share, max(top - floor, 0.02), radius, 128)
-        rows.append(np.column_stack([np.full(128, x * length), outline[:, 0], outline[:, 1] + (top + floor) / 2]))
+        outline = rounded_rectangle(width * share, max(top - floor, 0.02), 0.05, 128)
+        rows.append(np.column_stack([np.full(128, x), outline[:, 0], outline[:, 1] + (top + floor) / 2]))
     return loft(np.stack(rows))
 
 
