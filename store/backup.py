@@ -1,7 +1,7 @@
 """A copy of a memory while it is used: the database by SQLite's online backup, then the folders that the copied rows name.
 
-Folders never change once they have their name, so only one that was removed since the rows were copied can be missing: then the rows
-are copied again.
+Folders never change once they have their name, but for arrays that were computed anew, under another name. So only what was removed since
+the rows were copied can be missing: then the rows are copied again.
 """
 
 from __future__ import annotations
@@ -78,16 +78,17 @@ def _copy_rows(connection: Connection, partial: Path) -> None:
 
 
 def _copy_folders(connection: Connection, partial: Path, progress: Progress) -> bool:
-    """Copies the folders that the copied rows name and that are not there yet; returns False where one was removed meanwhile."""
+    """Copies the folders that the copied rows name and that are not there yet; returns False where something was removed meanwhile."""
     with closing(sqlite3.connect(partial / DATABASE)) as copied:
         named = [(table, *row) for table, query in FOLDERS.items() for row in copied.execute(query)]
     total = sum(file.size for *_, files in named for file in files_from_json(files).values())
     done, whole = 0, True
     for table, row_id, folder, text in named:
         files = files_from_json(text)
-        if not (partial / folder).exists():
+        if not all((partial / folder / name).exists() for name in files):
+            shutil.rmtree(partial / folder, ignore_errors=True)
             copied_all = _copy_folder(connection.root / folder, partial / folder, files)
-            whole &= copied_all or bool(connection.rows(f"SELECT 1 FROM {table} WHERE id = ?", row_id))
+            whole &= copied_all or bool(connection.rows(f"SELECT 1 FROM {table} WHERE id = ? AND files = ?", row_id, text))
         done += sum(file.size for file in files.values())
         progress(done, total)
     return whole

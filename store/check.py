@@ -56,7 +56,8 @@ def check(connection: Connection, progress: Progress = untold) -> CheckReport:
     done = 0
     for table, row, files in folders:
         found = {name: wrong for name, file in files.items() if (wrong := problem(connection.root / row["folder"] / name, file))}
-        if found and connection.rows(f"SELECT 1 FROM {table} WHERE id = ?", row["id"]):  # else it was removed meanwhile
+        as_read = f"SELECT 1 FROM {table} WHERE id = ? AND files = ?"  # else it was removed, or computed anew, meanwhile
+        if found and connection.rows(as_read, row["id"], row["files"]):
             damages += [_of_file(connection, table, row, name, wrong) for name, wrong in found.items()]
         done += _size(files)
         progress(done, total)

@@ -102,7 +102,7 @@ def problem(path: Path, expected: FileSum) -> str | None:
         return f"cannot be read: {error.strerror}"
     if found.size != expected.size:
         return f"has {found.size} bytes, {expected.size} were written"
-    return None if found == expected else f"its SHA-256 is {found.sha256[:12]}…, {expected.sha256[:12]}… was written"
+    return None if found == expected else f"has SHA-256 {found.sha256[:12]}…, {expected.sha256[:12]}… was written"
 
 
 def remove_orphans(parent: Path, known: Collection[str]) -> None:

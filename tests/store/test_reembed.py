@@ -21,6 +21,7 @@ from core.views import Burst
 from store import reembed
 from store.memory import Memory
 from store.observations import Joins
+from store.progress import Progress
 from store.records import Category
 from tests.store.conftest import KNOWN, NOVEL
 
@@ -246,3 +247,22 @@ def test_an_observation_that_cannot_be_computed_goes_with_its_burst(learnt: Memo
     assert learnt.observations.latest(1) == []
     assert not learnt.observations.folder(seen.id).exists()
     assert learnt.check().ok
+
+
+def once(work: Callable[[], object]) -> Progress:
+    """Does something when it is told for the first time how far it is."""
+    left = [work]
+    return lambda done, total: left.pop()() if left else None
+
+
+def test_what_is_computed_anew_meanwhile_is_not_called_damaged(learnt: Memory, other: Backbone) -> None:
+    with Memory.reading(learnt.folder) as reader:
+        assert reader.check(once(lambda: learnt.reembed(other))).ok
+
+
+def test_a_backup_meanwhile_is_of_the_one_or_of_the_other(learnt: Memory, other: Backbone, tmp_path: Path) -> None:
+    with Memory.reading(learnt.folder) as reader:
+        backup = reader.backup(tmp_path / "copy", once(lambda: learnt.reembed(other)))
+    assert backup.damages == ()
+    with Memory.open(backup.folder) as copy:
+        assert (copy.backbone, copy.check().ok) == ("hue", True)
