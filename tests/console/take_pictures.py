@@ -32,7 +32,7 @@ from clients.simulator.local_service import local_service  # noqa: E402
 WIDE = {"width": 1280, "height": 860}
 PHONE = {"width": 390, "height": 780}
 QUALITY = 62
-DARK = ("now", "category")
+DARK = ("now",)
 """Pages that are also taken in the dark."""
 LONG = ("observation", "category", "memory")
 """Pages that are taken whole."""
