@@ -11,8 +11,10 @@ import numpy as np
 import pytest
 
 from clients.datasets.folders import find_sequences, load_burst
-from core.quality import Region, faults, region_of_sphere, sharpness
+from core.quality import Region, faults, region_of_encoded, region_of_mask, region_of_sphere, sharpness
 from core.views import Camera, View
+
+from .conftest import PaintedObject
 
 
 @pytest.fixture(scope="module")
@@ -67,3 +69,16 @@ def test_a_sphere_is_where_the_camera_sees_it() -> None:
     camera: Any = Camera(np.array([[100.0, 0, 50], [0, 100, 40], [0, 0, 1]]), np.eye(4))
     assert region_of_sphere(camera, np.array([0.5, 0, 2.0]), 0.4) == Region(75, 40, pytest.approx(20))
     assert region_of_sphere(camera, np.array([0, 0, -1.0]), 0.4) is None
+
+
+def test_a_silhouette_is_in_the_square_around_it() -> None:
+    mask = np.zeros((40, 60), bool)
+    mask[10:14, 20:30] = True
+    assert region_of_mask(mask) == Region(24.5, 11.5, 10)
+
+
+def test_patches_are_in_the_square_around_them(painted: PaintedObject) -> None:
+    """Patches of 8 pixels: the object's reach over rows 16 to 39 and columns 40 to 47."""
+    view = painted.encode(1).views[0]
+    assert region_of_encoded(replace(view, cells=np.array([[2, 5], [4, 5]], np.int16))) == Region(43.5, 27.5, 24)
+    assert region_of_encoded(replace(view, cells=np.zeros((0, 2), np.int16))) is None
