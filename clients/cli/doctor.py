@@ -21,6 +21,7 @@ from clients.errors import ClientError
 from core.errors import InvalidInput, OneLookError
 
 if TYPE_CHECKING:
+    from core.backbones.base import Backbone
     from service.settings import Settings
 
 PYTHONS = ((3, 10), (3, 14))
@@ -157,14 +158,12 @@ def device(settings: Settings) -> Finding:
 
 def weights(settings: Settings) -> Finding:
     """The backbone's, where they are on this machine: loaded, to see that they are whole."""
-    from core.backbones import EMBEDDED, load_backbone
-    from core.backbones.weights import FOLDER_NAME, cache_folder
+    from core.backbones.weights import cache_folder
 
-    folder = cache_folder() / FOLDER_NAME
-    if settings.backbone == EMBEDDED and not folder.is_dir():
+    loaded = _backbone_here(settings)
+    if loaded is None:
         remedy = "the first start downloads 90 MB; without a network copy the cache folder of a machine that has them"
         return Finding("weights", State.poor, f"not in {cache_folder()} yet", remedy)
-    loaded = load_backbone(settings.backbone)
     return Finding("weights", State.good, f"{loaded.name}, fingerprint {loaded.fingerprint[:12]}")
 
 
@@ -179,10 +178,13 @@ def memory(settings: Settings) -> Finding:
             return Finding("memory", State.good, f"none in {settings.data_dir} yet; the first start makes it")
         return Finding("memory", State.bad, f"{place} cannot be written", "name another folder with ONELOOK_DATA_DIR or --data-dir")
     with Memory.reading(settings.data_dir) as stored:
-        made_with, count = stored.backbone, len(stored.categories.all())
-    if made_with not in (None, settings.backbone):
+        made_with, fingerprint, count = stored.backbone, stored.fingerprint, len(stored.categories.all())
+    loaded = _backbone_here(settings)
+    same = made_with == settings.backbone if loaded is None else fingerprint == loaded.fingerprint
+    if fingerprint is not None and not same:
+        found = f"{settings.data_dir} was made with {made_with} (fingerprint {fingerprint[:12]}), which is not this {settings.backbone}"
         remedy = f"set ONELOOK_BACKBONE={made_with}, or another ONELOOK_DATA_DIR, or run: onelook memory reembed"
-        return Finding("memory", State.bad, f"{settings.data_dir} was made with {made_with}, not {settings.backbone}", remedy)
+        return Finding("memory", State.bad, found, remedy)
     return Finding("memory", State.good, f"{count} categories in {settings.data_dir}; `onelook memory check` reads all of it")
 
 
@@ -225,6 +227,16 @@ def port(settings: Settings) -> Finding:
     except (ClientError, InvalidInput):
         remedy = "stop what uses it, or choose another one with ONELOOK_PORT or --port (0 takes a free one)"
         return Finding("port", State.bad, f"{url}: {refused}", remedy)
+
+
+def _backbone_here(settings: Settings) -> Backbone | None:
+    """The backbone; None where its weights would first have to be fetched."""
+    from core.backbones import EMBEDDED, load_backbone
+    from core.backbones.weights import FOLDER_NAME, cache_folder
+
+    if settings.backbone == EMBEDDED and not (cache_folder() / FOLDER_NAME).is_dir():
+        return None
+    return load_backbone(settings.backbone)
 
 
 def _why_not(library: str) -> Exception | None:

@@ -108,17 +108,20 @@ def test_weights_that_are_broken(monkeypatch: pytest.MonkeyPatch) -> None:
     assert findings()["weights"] == Finding("weights", State.bad, "model.safetensors is broken; delete the folder")
 
 
-def test_a_memory_of_another_backbone(tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", ["other", "dinov2-s14"])
+def test_a_memory_of_another_backbone_or_of_other_weights(tmp_path: Path, name: str) -> None:
     with Memory.open(tmp_path / "memory") as memory:
-        memory.require_backbone("other", "other-1")
+        memory.require_backbone(name, "other-1")
         found = findings()["memory"]  # also while it is open
     assert found.state is State.bad
-    assert "ONELOOK_BACKBONE=other" in (found.remedy or "")
+    assert f"was made with {name} (fingerprint other-1)" in found.found
+    assert f"ONELOOK_BACKBONE={name}" in (found.remedy or "")
 
 
-def test_a_memory_with_something_in_it(tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", ["dinov2-s14", "where/it/was/before"])
+def test_a_memory_with_something_in_it(tmp_path: Path, name: str) -> None:
     with Memory.open(tmp_path / "memory") as memory:
-        memory.require_backbone("dinov2-s14", "1")
+        memory.require_backbone(name, "0123456789abcdef")
     assert findings()["memory"].found.startswith("0 categories in")
 
 
