@@ -53,6 +53,7 @@ def simulate(
     if data is not None and world is None:
         given["world"] = WorldKind.replay.value
     plan = check(replace(base, **{name: value for name, value in given.items() if value is not None}))
+    plan.subjects()  # says what there is none of before the memory of a former run is deleted
     output = Output(out)
     out.mkdir(parents=True, exist_ok=True)
     if resume:

@@ -210,6 +210,13 @@ def test_missing_samples_are_said_to_be_missing(monkeypatch: pytest.MonkeyPatch,
     assert "--data" in failed.output
 
 
+def test_a_script_of_what_is_not_there_costs_no_former_run_its_memory(tmp_path: Path) -> None:
+    (tmp_path / "memory").mkdir()
+    (tmp_path / "script.yaml").write_text("categories: [unicorn]")
+    assert "'unicorn' is none of" in onelook("simulate", tmp_path / "script.yaml", "--out", tmp_path).output
+    assert (tmp_path / "memory").exists()
+
+
 def test_a_service_that_cannot_start_shows_its_log(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("ONELOOK_PORT", "8000")
     monkeypatch.setenv("ONELOOK_MAX_VIEWS", "many")
