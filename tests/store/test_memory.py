@@ -130,7 +130,7 @@ def test_whoever_does_not_know_the_limits_removes_nothing(folder: Path, burst: B
 
 
 def test_no_observation_at_all_is_refused() -> None:
-    with pytest.raises(InvalidInput, match="at least 1"):
+    with pytest.raises(InvalidInput, match="^observations: found 0, expected at least 1"):
         Retention(observations=0)
 
 
