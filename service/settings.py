@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from datetime import timedelta
 from ipaddress import ip_address
 from pathlib import Path
@@ -83,7 +84,8 @@ class Settings(BaseSettings):
     @property
     def backups(self) -> Path:
         """Where backups are made."""
-        return self.backup_dir or self.data_dir.with_name(f"{self.data_dir.name}-backups")
+        memory = Path(os.path.abspath(self.data_dir))  # `.` and `..` have no name to put beside; links stay as they are
+        return self.backup_dir or memory.with_name(f"{memory.name}-backups")
 
     def require_consistent(self) -> None:
         """Raises InvalidInput for settings that would starve the service."""

@@ -78,6 +78,12 @@ def test_a_span_beyond_the_calendar_is_refused_by_its_name(name):
             Settings(**{name: span})
 
 
+def test_backups_are_beside_the_memory_however_its_folder_is_written(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for written in (".", str(tmp_path), "below/..", f"../{tmp_path.name}"):
+        assert Settings(data_dir=written).backups == tmp_path.with_name(f"{tmp_path.name}-backups")
+
+
 def test_two_applications_live_side_by_side(settings, backbone, tmp_path, look, parts):
     other = settings.model_copy(update={"data_dir": tmp_path / "other"})
     with TestClient(create_app(settings, backbone=backbone)) as first, TestClient(create_app(other, backbone=backbone)) as second:
