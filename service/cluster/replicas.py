@@ -37,7 +37,7 @@ class EncoderReplica:
 
     def __init__(self, settings: Settings, backbone: Backbone | None) -> None:
         logging.config.dictConfig(config(settings.log))
-        self._backbone = BatchingBackbone(backbone or warm_backbone(settings))
+        self._backbone = BatchingBackbone(backbone or warm_backbone(settings), deadline_s=settings.deadline_s)
         self._encoder = Encoder(self._backbone)
 
     def facts(self) -> Facts:

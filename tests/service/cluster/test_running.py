@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import time
+import warnings
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
@@ -14,14 +16,37 @@ import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
+from core.errors import Unavailable
 from core.sim3 import Sim3
 from core.views import Burst, View
 from service.app import create_app
+from tests.service.conftest import LONG_S, Gate
 
 TIMES = {"created_at", "expires_at", "timings_ms"}
 """What no two runs have in common."""
+SHORT_S = 0.1
 LOOPBACK = {"0100007F", "0000000000000000FFFF00000100007F", "00000000000000000000000001000000"}
 """As the kernel writes it."""
+
+
+def test_an_encoder_whose_pass_hangs_asks_to_be_replaced(settings: Any, backbone: Any, look: Any, monkeypatch: Any) -> None:
+    monkeypatch.setattr("logging.config.dictConfig", lambda config: None)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # Ray's own
+        from service.cluster.replicas import EncoderReplica
+    gate = Gate(backbone)
+    encoder = EncoderReplica(settings.model_copy(update={"deadline_s": SHORT_S}), gate)
+    with ThreadPoolExecutor(1) as threads:
+        asked = threads.submit(encoder.encode, look())
+        try:
+            gate.entered.wait(LONG_S)
+            time.sleep(2 * SHORT_S)
+            with pytest.raises(Unavailable, match="longer than a request may take"):
+                encoder.check_health()
+        finally:
+            gate.open.set()
+        asked.result()
+    encoder.check_health()
 
 
 @pytest.fixture
