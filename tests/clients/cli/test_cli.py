@@ -211,10 +211,12 @@ def test_missing_samples_are_said_to_be_missing(monkeypatch: pytest.MonkeyPatch,
 
 
 def test_a_script_of_what_is_not_there_costs_no_former_run_its_memory(tmp_path: Path) -> None:
-    (tmp_path / "memory").mkdir()
+    learnt = tmp_path / "memory" / "learnt"
+    learnt.parent.mkdir()
+    learnt.touch()
     (tmp_path / "script.yaml").write_text("categories: [unicorn]")
     assert "'unicorn' is none of" in onelook("simulate", tmp_path / "script.yaml", "--out", tmp_path).output
-    assert (tmp_path / "memory").exists()
+    assert learnt.exists()
 
 
 def test_a_service_that_cannot_start_shows_its_log(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
