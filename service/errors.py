@@ -14,6 +14,7 @@ from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
 
 from core import errors as core
+from service.limits import media_type
 from service.logs import HEADER, request_id
 from service.refusals import Busy, NoKey, NotAllowed, TooOften
 from service.schemas.problem import MEDIA_TYPE, FieldError, Problem
@@ -114,14 +115,10 @@ def field_path(location: Sequence[int | str]) -> str:
 
 def _on_http_exception(request: Request, error: Exception) -> JSONResponse:
     assert isinstance(error, HTTPException)
-    if error.status_code == 400:  # what FastAPI says of a body that is no text
-        return _json(
-            problem_of(
-                core.InvalidInput(
-                    "body", "is no JSON that can be read: it is not UTF-8 text, too deeply nested, or has numbers that are too long"
-                )
-            )
-        )
+    if error.status_code == 400:  # what FastAPI says of a body that it cannot read
+        json = "is no JSON that can be read: it is not UTF-8 text, too deeply nested, or has numbers that are too long"
+        why = f"is no form that can be read: {error.detail}" if "form" in media_type(request.headers) else json
+        return _json(problem_of(core.InvalidInput("body", why)))
     title = HTTPStatus(error.status_code).phrase
     detail = str(error.detail)
     if error.status_code == 404 and detail == title:

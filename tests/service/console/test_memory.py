@@ -102,6 +102,12 @@ def test_names_are_text_and_never_markup(client, learn):
         assert "&lt;img src=x" in text
 
 
+def test_of_a_form_with_too_much_in_it_that_is_told(client):
+    answer = client.post("/memory/export", data={"category": ["x"] * 1001})
+    assert (answer.status_code, answer.json()["field"]) == (422, "body")
+    assert "no form that can be read: Too many fields" in answer.json()["detail"]
+
+
 def test_what_lies_right_of_the_threshold_is_known():
     prior = Prior.shipped().of(True)
     fit = Calibration.fit([0.2, 0.3], prior)
