@@ -1,4 +1,4 @@
-"""Which role each endpoint asks for: this table is the whole of it, and a route that is not in it does not start."""
+"""Which role each endpoint asks for: the table is all of it, and with a route that is missing from it the service does not start."""
 
 from __future__ import annotations
 
