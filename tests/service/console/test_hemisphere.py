@@ -28,6 +28,20 @@ def test_every_viewpoint_is_within_the_picture(request_of, up):
     for mark in drawn.marks:
         assert 0 < mark.x < WIDTH
         assert 0 < mark.y < HEIGHT
+    for line in drawn.lines:
+        places = np.array([place.split() for place in line.removeprefix("M").split("L")], float)
+        assert (places >= 0).all()
+        assert (places <= (WIDTH, HEIGHT)).all()
+
+
+def test_far_viewpoints_come_first_and_are_above_near_ones(request_of):
+    request, around = request_of((0, 0, 1)), np.tile(np.eye(4), (6, 1, 1))
+    angles = 0.3 + np.arange(6) * np.pi / 3
+    around[:, :2, 3] = 0.5 * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    rim = ScanRequest(np.zeros(3), request.up, 0.5, around, 0.2)
+    marks = hemisphere_of(rim, coverage(rim, [])).marks
+    assert [mark.behind for mark in marks] == [True] * 3 + [False] * 3
+    assert [mark.y < CENTRE[1] for mark in marks] == [True] * 3 + [False] * 3
 
 
 def test_it_fills_as_views_arrive(request_of):

@@ -12,7 +12,7 @@ from core.calibration import Calibration, Prior
 from core.novelty import Decision, Member
 from service.app import create_app
 from service.console.score_chart import BASE, WIDTH, score_chart
-from service.console.token_map import HEIGHT, token_map
+from service.console.token_map import HEIGHT, LABEL_HEIGHT, LABEL_WIDTH, ROOM, token_map
 from service.console.token_map import WIDTH as MAP_WIDTH
 from service.upkeep import Distribution
 
@@ -137,9 +137,21 @@ def test_alike_bursts_are_near_each_other_in_the_map():
     apart = min(np.linalg.norm(centres[a] - centres[b]) for a, b in ((0, 1), (0, 2), (1, 2)))
     assert apart > 4 * spread
     assert all(0 <= p.x <= MAP_WIDTH and 0 <= p.y <= HEIGHT for p in shown.points)
+    reach = np.ptp(np.concatenate(list(places.values())), axis=0)
+    assert np.isclose(reach, (MAP_WIDTH - 2 * ROOM, HEIGHT - 2 * ROOM), atol=0.2).any(), "as large as the drawing allows"
     assert len(shown.labels) == 3
     assert shown.explained > 0.9
     assert token_map(members, {"c0": None}).bursts == 10
+
+
+def test_names_of_bursts_at_one_place_do_not_cover_each_other():
+    tokens = np.eye(16)[[0, 0, 0, 1]] + 0.01 * np.eye(16)[[2, 3, 4, 5]]
+    shown = token_map(
+        [Member(f"c{index}", token[None], token[None]) for index, token in enumerate(tokens)], {f"c{index}": None for index in range(4)}
+    )
+    for index, label in enumerate(shown.labels):
+        for other in shown.labels[:index]:
+            assert abs(label.x - other.x) >= LABEL_WIDTH or abs(label.y - other.y) >= LABEL_HEIGHT
 
 
 def test_one_burst_is_drawn_too():
