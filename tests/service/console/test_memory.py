@@ -11,7 +11,7 @@ from fastapi.testclient import TestClient
 from core.calibration import Calibration, Prior
 from core.novelty import Decision, Member
 from service.app import create_app
-from service.console.score_chart import BASE, WIDTH, score_chart
+from service.console.score_chart import BASE, TICKS, WIDTH, score_chart
 from service.console.token_map import HEIGHT, LABEL_HEIGHT, LABEL_WIDTH, ROOM, token_map
 from service.console.token_map import WIDTH as MAP_WIDTH
 from service.upkeep import Distribution
@@ -118,6 +118,7 @@ def test_what_lies_right_of_the_threshold_is_known():
     known, novel = chart.dots
     assert novel.x < chart.uncertain.x < chart.known.x < known.x
     assert chart.own_rivals == 2
+    assert 2 <= len(chart.ticks) <= TICKS + 1
     places = np.array([[float(each) for each in pair.split(",")] for pair in re.findall(r"[-\d.]+,[-\d.]+", chart.rivals)])
     assert places[:, 0].min() >= 0
     assert places[:, 0].max() <= WIDTH

@@ -7,12 +7,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
+from core.boxes import OrientedBox
 from core.matches import Matches
+from core.pose_estimate import Alternative
 from core.sim3 import Sim3
 from service.console.alignment import moved
-from service.console.evidence import Matrix, Stage
+from service.console.evidence import Hypothesis, Matrix, Stage
 from service.features import PoseDetails
+from store.records import Pose
 
 TURNED = Sim3(1.3, np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]]), np.array([0.2, 0, 0.1]))
 
@@ -128,6 +132,14 @@ def test_pairs_that_were_not_compared_have_no_cell_and_no_part_in_the_scale():
 
 def test_a_matrix_of_nothing_compared_is_empty():
     assert Matrix.of(PoseDetails(NO_MATCHES, np.zeros((2, 2)), ())).cells == ()
+
+
+def test_how_far_a_hypothesis_is_turned_is_told_but_for_the_symmetries_of_the_object():
+    answered, rival, half_turn = (Rotation.from_euler("z", angle_deg, degrees=True).as_matrix() for angle_deg in (0, 170, 180))
+    alternative = Alternative(Sim3(1.0, rival, np.zeros(3)), 0.4, None)
+    box = OrientedBox(np.eye(4), np.ones(3))
+    pose = Pose(Sim3(1.0, answered, np.zeros(3)), box, 9, 9, 0, 0.01, 0.5, None, (alternative,), (), symmetries=half_turn[None])
+    assert [each.turned_deg for each in Hypothesis.all_of(pose)] == pytest.approx([0, 10])
 
 
 def test_stages_fill_the_bar():
