@@ -114,9 +114,9 @@ class Instances:
     def pooled_means(self, ids: Sequence[str]) -> dict[str, Array]:
         """Means over views of pooled tokens, shape (D,), without instances that have no parts; nothing behind these tokens is read."""
         found = {}
-        for row in self._rows(ids, "id, views, pooled, typeof(parts) AS parts"):
+        for row in self._rows(ids, "id, views, pooled, length(pooled) = length(cls) AS whole, typeof(parts) AS parts"):
             if row["parts"] != "null":
-                mean = tokens_from_blob(row["pooled"], row["views"]).mean(axis=0)
+                mean = tokens_from_blob(row["pooled"], row["views"]).mean(axis=0) if row["whole"] else np.array(np.nan)
                 if np.isfinite(mean).all():
                     found[row["id"]] = mean
                 else:

@@ -160,10 +160,13 @@ def test_damaged_tokens_are_left_out_and_the_rest_goes_on(memory: Memory, catego
     assert joined.id in caplog.text
 
 
-def test_means_of_damaged_tokens_are_left_out_and_told(memory: Memory, category: Category, joined: Instance, caplog) -> None:
+@pytest.mark.parametrize("blob", [arrays.tokens_to_blob(np.full((3, 8), np.nan)), bytes(4), bytes(3), bytes(3 * 16 * 4)])
+def test_means_of_damaged_tokens_are_left_out_and_told(
+    memory: Memory, category: Category, joined: Instance, caplog: pytest.LogCaptureFixture, blob: bytes
+) -> None:
     (first,) = (each for each in memory.instances.of(category.id) if each.id != joined.id)
     with memory._connection.change() as db:
-        db.execute("UPDATE instances SET pooled = ? WHERE id = ?", [arrays.tokens_to_blob(np.full((3, 8), np.nan)), joined.id])
+        db.execute("UPDATE instances SET pooled = ? WHERE id = ?", [blob, joined.id])
     assert list(memory.instances.pooled_means([first.id, joined.id])) == [first.id]
     assert joined.id in caplog.text
 
