@@ -156,7 +156,7 @@ def _evenly_spaced(frames: list[Frame]) -> tuple[Frame, ...]:
 
 
 def _read_labels(folder: Path) -> dict[str, Mapping[str, Any]]:
-    labels = [json.loads(path.read_text()) for path in sorted(folder.glob("*.json"))]
+    labels = [folders.read_json(path) for path in sorted(folder.glob("*.json"))]
     return {label["seq"]: label for label in labels}
 
 

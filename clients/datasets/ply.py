@@ -30,17 +30,17 @@ def read_vertices(path: Path) -> FloatArray:
     elements = [line[1:] for line in lines if line[:1] == ["element"]]
     if not mark or lines[:1] != [["ply"]] or not elements or elements[0][0] != "vertex":
         raise InvalidInput(str(path), "is not a PLY file whose first element is vertex")
-    count = int(elements[0][1])
-    layout = next(line[1] for line in lines if line[:1] == ["format"])
-    start = lines.index(["element", *elements[0]]) + 1
-    end = lines.index(["element", *elements[1]]) if len(elements) > 1 else len(lines)
-    properties = [(line[-1], line[1]) for line in lines[start:end] if line[:1] == ["property"]]
     try:
+        count = int(elements[0][1])
+        layout = next((line[1] for line in lines if line[:1] == ["format"]), "")
+        start = lines.index(["element", *elements[0]]) + 1
+        end = lines.index(["element", *elements[1]]) if len(elements) > 1 else len(lines)
+        properties = [(line[-1], line[1]) for line in lines[start:end] if line[:1] == ["property"]]
         if layout == "ascii":
             table = np.loadtxt(body.decode("ascii").splitlines()[:count], ndmin=2)
             return np.stack([table[:, [name for name, _ in properties].index(axis)] for axis in "xyz"], axis=1)
         kind = np.dtype([(name, ORDERS[layout] + TYPES[number]) for name, number in properties])
         vertices = np.frombuffer(body, kind, count)
         return np.stack([vertices[axis].astype(float) for axis in "xyz"], axis=1)
-    except (KeyError, ValueError) as error:
+    except (IndexError, KeyError, ValueError) as error:
         raise InvalidInput(str(path), f"is a PLY file whose vertices cannot be read ({error})") from None

@@ -57,6 +57,15 @@ def test_labels_take_the_reference_to_another_sequence(root: Path) -> None:
     assert first.longest_side_m == pytest.approx(0.6, rel=0.03)
 
 
+def test_a_label_that_is_no_json_is_named(root: Path) -> None:
+    label(root, "cup", "1_2_3", "1_2_3", np.eye(4))
+    (file,) = (root / "class_labels" / "cup").iterdir()
+    file.write_text("{")
+    with pytest.raises(InvalidInput, match="is not JSON") as caught:
+        co3d.find_sequences(root)
+    assert caught.value.field == str(file)
+
+
 def test_only_labelled_sequences_are_taken_where_there_are_labels(root: Path) -> None:
     label(root, "cup", "4_5_6", "1_2_3", np.eye(4))
     assert [each.instance for each in co3d.find_sequences(root)] == ["4_5_6"]
