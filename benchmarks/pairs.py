@@ -1,4 +1,4 @@
-"""Which pairs of objects a pose benchmark estimates, and which of their views it uses. Both are seeded."""
+"""Which objects a benchmark takes, in pairs, and which of their views. What is sampled is seeded."""
 
 from __future__ import annotations
 

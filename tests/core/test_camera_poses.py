@@ -33,6 +33,12 @@ def test_every_viewpoint_looks_at_the_centre_from_above() -> None:
         assert abs(pose[:3, 0] @ UP) < 1e-9
 
 
+def test_viewpoints_climb_evenly_within_the_range_of_elevations() -> None:
+    heights = hemisphere(np.zeros(3), np.array([0.0, 0, 1]), 1.0, 10)[:, 2, 3]
+    low, high = np.sin(np.radians(ELEVATION_RANGE_DEG))
+    assert heights == pytest.approx(np.linspace(low, high, 21)[1::2])
+
+
 def test_viewpoints_go_all_around() -> None:
     offsets = hemisphere(np.zeros(3), np.array([0.0, 0, 1]), 1.0, 10)[:, :3, 3]
     azimuth = np.sort(np.degrees(np.arctan2(offsets[:, 1], offsets[:, 0])))

@@ -136,6 +136,13 @@ def test_an_object_is_lost_after_a_while_and_found_anew() -> None:
     assert step(track, [turned(90)]).pose is not None
 
 
+def test_a_pose_that_is_not_believed_yet_is_no_miss() -> None:
+    track = step(Track(), [turned(0)])
+    for poses in (None, None, [turned(100)], None, None):
+        track = missed(track, 0.1, CONFIG) if poses is None else step(track, poses)
+    assert track.found
+
+
 def test_symmetries_turn_the_reference_about_its_middle() -> None:
     pose = turned(30, 1.5, (0.1, 0, 0))
     same, other = with_symmetries([pose], HALF_TURN, CENTER)
