@@ -85,6 +85,13 @@ def test_robots_of_one_memory_stand_side_by_side_in_the_timeline() -> None:
     assert [each.label for each in met] == ["1", "2.1", "2", "2.2"]
 
 
+def test_columns_fill_the_width_of_the_timeline_and_labels_are_below_them() -> None:
+    timeline = Timeline([BASE, FALSE_KNOWN])
+    first, last = (timeline.x(each) for each in timeline.encounters)
+    assert (first - timeline.left, timeline.width - last) == pytest.approx((timeline.half_step, timeline.half_step), abs=0.1)
+    assert timeline.height > timeline.bottom
+
+
 def test_a_long_timeline_numbers_what_it_has_room_for() -> None:
     timeline = Timeline([replace(BASE, number=number) for number in range(1, 201)])
     places = [timeline.x(each) for each in timeline.numbered]
