@@ -202,7 +202,7 @@ class AsyncRobotClient:
                     if (event := reader.feed(line)) is not None:
                         yield event
         except httpx.TransportError as error:
-            raise broken(error, url) from error
+            raise broken(error, url) from None
 
     def track(self, category_id: str | None = None, **options: Any) -> AsyncTrack:
         """As `RobotClient.track`: `async with robot.track() as track: tracked = await track.step(view)`."""

@@ -76,7 +76,7 @@ def exchange(call: Call[T], retry: Retry, url: str) -> Exchange[T]:
             return call.read(came)  # the first attempt deleted it, and its answer was lost
         wait_s = _wait_s(came, attempt, retry, jitter)
         if wait_s is None or attempt == retry.attempts:
-            raise _failure(came, call, url) from (came if isinstance(came, Exception) else None)
+            raise _failure(came, call, url) from None
         yield Wait(wait_s)
     raise AssertionError("a retry has at least one attempt")
 
@@ -125,7 +125,7 @@ def _failure(came: httpx.Response | httpx.TransportError, call: Call[Any], url: 
     if isinstance(came, httpx.Response):
         return problem_of(came)
     if isinstance(came, (httpx.ConnectError, httpx.ConnectTimeout)):
-        return Unreachable(f"nothing answers at {url}; start the service with `onelook serve`, or give its address")
+        return _no_connection(came, url)
     if isinstance(came, httpx.TimeoutException):
         return TooSlow(f"{url} did not answer {call.method} {call.path} in time; send fewer views, or allow more time")
     return broken(came, url)
@@ -133,7 +133,22 @@ def _failure(came: httpx.Response | httpx.TransportError, call: Call[Any], url: 
 
 def broken(why: Exception, url: str) -> Unreachable:
     """The exception for a connection that did not last."""
-    return Unreachable(f"the connection to {url} broke ({why}); look at the service's log")
+    return Unreachable(f"the connection to {url} broke ({_reason(why)}); look at the service's log")
+
+
+def _no_connection(why: Exception, url: str) -> Unreachable:
+    return Unreachable(f"no connection to {url} ({_reason(why)}); start the service with `onelook serve`, or give its address")
+
+
+def _reason(error: BaseException) -> str:
+    """What the operating system or TLS said first: the exceptions of asyncio above it do not repeat it."""
+    said = str(error) or type(error).__name__
+    beneath = error.__cause__ or error.__context__
+    while beneath is not None:
+        if isinstance(beneath, OSError) and str(beneath):
+            said = str(beneath)
+        beneath = beneath.__cause__ or beneath.__context__
+    return said
 
 
 def address(url: str) -> str:
@@ -168,9 +183,9 @@ def connection_to(url: str) -> Iterator[None]:
         refused = error.response
         raise problem_of(
             httpx.Response(refused.status_code, headers=list(refused.headers.raw_items()), content=bytes(refused.body))
-        ) from error
+        ) from None
     except (OSError, WebSocketException) as error:
-        raise Unreachable(f"no connection to {url} ({error}); start the service with `onelook serve`, or give its address") from error
+        raise _no_connection(error, url) from None
 
 
 def endless(timeout: httpx.Timeout) -> httpx.Timeout:

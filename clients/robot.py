@@ -220,7 +220,7 @@ class RobotClient:
                     if (event := reader.feed(line)) is not None:
                         yield event
         except httpx.TransportError as error:
-            raise broken(error, url) from error
+            raise broken(error, url) from None
 
     def track(self, category_id: str | None = None, **options: Any) -> Track:
         """Follows an object, of a category or of one that the first frames decide; `options` are `window`, `variant`, `weight`, `seed`.

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import asyncio
+import socket
+import traceback
+from collections.abc import Callable, Iterator
 from datetime import datetime, timedelta, timezone
 from email.utils import format_datetime
 
@@ -11,6 +14,7 @@ import numpy as np
 import pytest
 
 from clients import errors
+from clients.asynchronous import AsyncRobotClient
 from clients.exchange import KEY, Retry, retry_after_s
 from clients.robot import RobotClient
 from core.views import Burst, View
@@ -159,6 +163,58 @@ def test_a_deletion_whose_answer_was_lost_is_done(connect: Connect) -> None:
     robot, _ = connect(problem(404, "not-found"))
     with pytest.raises(errors.NotFoundProblem):
         robot.forget("c")
+
+
+@pytest.fixture
+def refusing() -> Iterator[str]:
+    """An address at which nothing listens: its port is taken."""
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        yield f"http://127.0.0.1:{taken.getsockname()[1]}"
+
+
+def asynchronously(url: str) -> None:
+    async def ask() -> None:
+        async with AsyncRobotClient(url, retry=Retry(attempts=1)) as robot:
+            await robot.categories()
+
+    asyncio.run(ask())
+
+
+async def _told(url: str) -> None:
+    async with AsyncRobotClient(url) as robot:
+        async for _ in robot.events():
+            pass
+
+
+async def _followed(url: str) -> None:
+    async with AsyncRobotClient(url).track():
+        pass
+
+
+@pytest.mark.parametrize(
+    "ask",
+    [
+        lambda url: RobotClient(url, retry=Retry(attempts=1)).categories(),
+        lambda url: next(RobotClient(url).events()),
+        lambda url: RobotClient(url).track().__enter__(),
+        asynchronously,
+        lambda url: asyncio.run(_told(url)),
+        lambda url: asyncio.run(_followed(url)),
+    ],
+    ids=["asked", "events", "track", "asked by asyncio", "events by asyncio", "track by asyncio"],
+)
+def test_a_failure_is_one_exception_with_the_reason(ask: Callable[[str], object], refusing: str) -> None:
+    with pytest.raises(errors.Unreachable, match=r"refused|Connect call failed") as caught:
+        ask(refusing)
+    assert refusing.removeprefix("http") in str(caught.value)
+    assert "".join(traceback.format_exception(caught.value)).count("Traceback") == 1
+
+
+def test_a_failure_that_says_nothing_is_told_by_its_kind(connect: Connect) -> None:
+    robot, _ = connect(httpx.ConnectTimeout(""), retry=Retry(attempts=1))
+    with pytest.raises(errors.Unreachable, match="ConnectTimeout"):
+        robot.categories()
 
 
 def test_retry_after_may_be_a_date() -> None:
