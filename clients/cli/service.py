@@ -60,10 +60,11 @@ def serve(
 
 
 def _serve_here(settings: Settings) -> None:
-    from service.app import checked_backbone, create_app
-    from service.server import Server
-
     with _listener(settings) as listener:
+        log.info("loading the backbone %s; this takes a while", settings.backbone)  # before the imports, which are part of it
+        from service.app import checked_backbone, create_app
+        from service.server import Server
+
         # Opened once before uvicorn starts, which would wrap the sentence that says what is wrong in a traceback.
         app = create_app(settings, backbone=checked_backbone(settings))
         url = url_of(settings.host, listener.getsockname()[1])

@@ -73,6 +73,16 @@ def test_it_says_where_it_serves(serve: Callable[..., Result], tmp_path: Path) -
     assert str(tmp_path / "memory") in started.stderr
 
 
+def test_it_says_what_takes_long_before_it_begins(serve: Callable[..., Result], monkeypatch: pytest.MonkeyPatch) -> None:
+    def load(name: str, device: str, report: Callable[[str], None]) -> Loaded:
+        report("begun")
+        return Loaded()
+
+    monkeypatch.setattr(service.app, "load_backbone", load)
+    said = serve().stderr
+    assert 0 < said.index("loading the backbone dinov2-s14") < said.index("begun")
+
+
 def test_an_address_of_ipv6_is_in_brackets(serve: Callable[..., Result], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("clients.cli.service.bound", lambda host, port: bound("127.0.0.1", port))  # which every machine has
     assert "serving on http://[::1]:" in serve("--host", "::1").stderr
@@ -87,7 +97,7 @@ def test_it_listens_only_once_it_is_warm(serve: Callable[..., Result], monkeypat
 
 def test_the_log_is_json_where_it_is_asked_for(serve: Callable[..., Result], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ONELOOK_LOG", "json")
-    assert [json.loads(line)["message"].split()[0] for line in serve().stderr.splitlines()] == ["warmed", "serving"]
+    assert [json.loads(line)["message"].split()[0] for line in serve().stderr.splitlines()] == ["loading", "warmed", "serving"]
     monkeypatch.setenv("ONELOOK_LOG", "xml")
     refused(serve(), "ONELOOK_LOG", "'xml'")
 
