@@ -31,6 +31,8 @@ def find_sequences(data: Path | str) -> list[folders.Sequence]:
         raise InvalidInput(
             "data", f"{prefix!r} in {str(data)!r} is none of {', '.join(FORMATS)}; a folder in the data layout has no prefix"
         )
+    if root.is_file():
+        raise InvalidInput("data", f"{root} is a file; name the folder that holds it: {prefix + ':' if prefix else ''}{root.parent}")
     if not root.is_dir():
         raise InvalidInput("data", f"{root} is no folder; name the one that holds the recordings")
     return FORMATS[prefix](root) if prefix else folders.find_sequences(root)

@@ -52,6 +52,15 @@ def test_a_folder_that_is_none_is_named(data: str) -> None:
         find_sequences(data)
 
 
+def test_of_a_file_the_folder_is_named_as_it_can_be_asked_for(tmp_path: Path) -> None:
+    file = tmp_path / "transforms.json"
+    file.touch()
+    with pytest.raises(InvalidInput, match=f"is a file; name the folder that holds it: transforms:{tmp_path}$"):
+        find_sequences(f"transforms:{file}")
+    with pytest.raises(InvalidInput, match=f"is a file; name the folder that holds it: {tmp_path}$"):
+        find_sequences(file)
+
+
 def test_of_several_objects_one_is_named_as_it_can_be_asked_for(tmp_path: Path) -> None:
     for name in ("a", "b"):
         (tmp_path / name).mkdir()
