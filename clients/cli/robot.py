@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Mapping
 from dataclasses import asdict
 from enum import Enum
 from pathlib import Path
@@ -141,9 +143,21 @@ def _facts(seen: Observation) -> dict[str, object]:
         facts["scale"] = f"{seen.pose.scale:.3f} of the reference"
         facts["centre"] = ", ".join(f"{value:.3f}" for value in seen.pose.world_from_object[:3, 3]) + " m in the burst's world frame"
         facts["box"] = " × ".join(f"{100 * edge:.1f}" for edge in seen.pose.extent_m) + " cm"
+        if seen.pose.confidence is not None:
+            facts["confidence"] = f"{seen.pose.confidence:.2f} that the rotation is within 30°"
         facts["inliers"] = f"{seen.pose.inliers} of {seen.pose.correspondences} correspondences"
     if seen.scan is not None:
         facts["scan"] = f"{len(seen.scan)} viewpoints asked for ({seen.scan.id}); `onelook scan FOLDER` learns the category"
+    facts |= _grounds(seen.raw["grounds"] or {})
     facts |= {"no pose": seen.pose_error} if seen.pose_error else {}
     facts |= {"no scan": seen.scan_error} if seen.scan_error else {}
     return facts | {"observation": seen.id, "time": f"{seen.timings_ms['total']:.0f} ms"}
+
+
+def _grounds(grounds: Mapping[str, Any]) -> dict[str, object]:
+    """What is wrong with the views, each kind with the number of views that have it, and why the answer rests on little."""
+    faults = Counter(fault["kind"] for view in grounds.get("faults", ()) for fault in view)
+    facts: dict[str, object] = {}
+    if faults:
+        facts["faults"] = ", ".join(f"{kind} in {count}" for kind, count in faults.most_common()) + f" of {grounds['views']} views"
+    return facts | ({"weakness": grounds["weakness"]} if grounds.get("weakness") else {})

@@ -19,6 +19,7 @@ from typer.main import get_command
 from typer.testing import CliRunner, Result
 
 import service.app
+from clients.answers.observations import Observation
 from clients.cli import app
 from clients.cli.robot import _facts
 from clients.cli.simulate import service as simulated_service
@@ -278,7 +279,21 @@ def test_an_uncertain_answer_says_where_to_look_next() -> None:
         viewpoints=pose[None],
         id="o",
         timings_ms={"total": 7.0},
+        raw={"grounds": None},
     )
     facts = _facts(seen)
     assert facts["candidates"] == "cup, bowl"
     assert facts["look from"] == "0.50, -0.25, 1.00 m, in the burst's world frame, next"
+    assert not {"faults", "weakness", "confidence"} & set(facts)
+
+
+def test_a_doubtful_pose_does_not_look_like_a_good_one(url: str, recordings: list[Sequence], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(quality, "LEAST_SHARPNESS", 1e9)
+    folder = recordings[0].path
+    onelook("scan", folder, "--views", 3, "--name", "bug", "--url", url)
+    asked = ("observe", folder, "--category", "bug", "--views", 1, "--no-learn", "--url", url)
+    said, seen = onelook(*asked).output, json.loads(onelook(*asked, "--json").output)
+    assert "blur in 1 of 1 views" in said
+    assert "it rests on one view" in said
+    doubtful = Observation.from_json({**seen, "pose": {**seen["pose"], "confidence": 0.1}})
+    assert _facts(doubtful)["confidence"] == "0.10 that the rotation is within 30°"
