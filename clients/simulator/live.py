@@ -15,8 +15,8 @@ from clients.simulator.teacher import Lesson, TeachingSummary
 STAGES = {"find": "find", "features": "features", "points": "features", "decide": "decide"}
 """The service's stages, by the column they are added up in; all others are part of the pose."""
 COLUMNS = ("find", "features", "decide", "pose")
-WIDE = 120
-"""Characters a line from which there is room for every stage."""
+TIMED, WIDE = 88, 120
+"""Characters a line from which there is room for the time of an answer, and for that of every stage."""
 STYLES = {
     Verdict.NEW: "cyan",
     Verdict.RECOGNISED: "green",
@@ -31,7 +31,7 @@ def show(encounters: Iterable[Encounter], total: int, console: Console) -> list[
 
     Rows are printed and not redrawn, so that a long episode scrolls and a log file gets the same table.
     """
-    stages = COLUMNS if console.width >= WIDE else ("total",)
+    stages = COLUMNS if console.width >= WIDE else ("total",) if console.width >= TIMED else ()
     console.print(_row(stages, header=True))
     done: list[Encounter] = []
     with console.status(f"1 of {total}") as status:
@@ -156,7 +156,7 @@ def _row(stages: Sequence[str], encounter: Encounter | None = None, *, header: b
     """A table of one row, or of the headings; all have the same widths."""
     table = Table(box=None, show_header=header, pad_edge=False, padding=(0, 1, 0, 0), header_style="dim")
     table.add_column("#", justify="right", width=4)
-    for heading, width in (("object", 22), ("decision", 22)):
+    for heading, width in (("object", 18), ("decision", 24)):
         table.add_column(heading, width=width, no_wrap=True)
     table.add_column("similarity", justify="right", width=14)
     table.add_column("rotation", justify="right", width=8)
@@ -172,7 +172,13 @@ def _cells(encounter: Encounter, stages: Sequence[str]) -> list[Text | str]:
     spent = {**stage_ms(encounter), "total": encounter.timings_ms["total"]}
     times = [f"{spent[stage]:.0f}" if stage in spent else "" for stage in stages]
     scan = "" if encounter.scan_ms is None else f"{encounter.scan_ms / 1e3:.1f}"
-    return [encounter.label, encounter.name, _decision(encounter), similarity(encounter), _rotation(encounter), *times, scan]
+    return [encounter.label, _name(encounter), _decision(encounter), similarity(encounter), _rotation(encounter), *times, scan]
+
+
+def _name(encounter: Encounter) -> str:
+    """The instance's alone, where that says the category: there is little room."""
+    instance = encounter.name.rpartition("/")[2]
+    return instance if instance.startswith(encounter.category) else encounter.name
 
 
 def _decision(encounter: Encounter) -> Text:

@@ -145,4 +145,17 @@ def test_the_terminal_shows_wrong_decisions_in_words(met: list[Encounter]) -> No
     show(met, total=3, console=Console(file=output, width=160))
     assert "FALSE" in output.getvalue()
     assert "memory empty" in output.getvalue()
-    assert met[0].name in output.getvalue()
+    assert f" {met[0].name.rpartition('/')[2]} " in output.getvalue()
+
+
+@pytest.mark.parametrize("width", [80, 90, 120])
+def test_a_row_is_one_whole_line_on_every_terminal(met: list[Encounter], width: int) -> None:
+    output, name = io.StringIO(), "locomotive/locomotive_1"
+    long = replace(met[0], number=15, name=name, category="locomotive", kind="locomotive", verdict=Verdict.FALSE_KNOWN)
+    show([replace(long, similarity=-0.186, threshold=0.375)], total=1, console=Console(file=output, width=width))
+    head, row = output.getvalue().rstrip().splitlines()
+    assert {"object", "decision", "similarity", "rotation", "scan"} <= set(head.split())
+    assert ("ms" in head) == (width > 80)
+    assert row.startswith("  15 locomotive_1 ")
+    assert "FALSE KNOWN → locomotive" in row
+    assert "-0.186 ≤ 0.375" in row
