@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
 
-from core.coherence import require_one_unit
+from core.coherence import require_one_place, require_one_unit
 from core.encode import EncodedBurst
 from core.grounds import Grounds, grounds
 from core.view_consistency import consistent_only
@@ -38,8 +38,9 @@ class Look:
 
 
 def look(burst: Burst, encoder: Encodes) -> Look:
-    """Raises NoObject where no view shows an object, InvalidInput where depth and cameras are in different units."""
+    """Raises NoObject where no view shows an object, InvalidInput where depth and cameras are in different units or cameras are wrong."""
     found = encoder.encode(burst)
     consistent = consistent_only(found)
     require_one_unit(consistent)
+    require_one_place(consistent)
     return Look(burst, found, consistent)

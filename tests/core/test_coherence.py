@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from core.camera_poses import hemisphere
-from core.coherence import incoherent, require_one_unit
+from core.coherence import incoherent, require_one_place, require_one_unit
 from core.encode import Encoder
 from core.errors import InvalidInput
 from core.sim3 import Sim3
@@ -22,15 +22,15 @@ def at(x, y, z):
     return Sim3(1.0, np.eye(3), np.array([x, y, z]))
 
 
+def with_cameras(burst, change):
+    """The same images and depth with world_from_camera changed."""
+    return Burst([replace(each, camera=Camera(each.camera.K, change(each.camera.world_from_camera))) for each in burst.views])
+
+
 def with_translations(burst, times):
-    """The same images and depth from cameras whose translations are in another unit."""
-
-    def view(each):
-        pose = each.camera.world_from_camera.copy()
-        pose[:3, 3] *= times
-        return replace(each, camera=Camera(each.camera.K, pose))
-
-    return Burst([view(each) for each in burst.views])
+    """From cameras whose translations are in another unit."""
+    scaling = np.diag([times, times, times, 1.0])
+    return with_cameras(burst, lambda pose: scaling @ pose @ np.linalg.inv(scaling))
 
 
 def with_depth(burst, times):
@@ -69,14 +69,8 @@ def test_one_view_and_views_without_depth_do_not_tell(look, backbone):
 
 def test_cameras_at_one_place_that_look_elsewhere_do_not_tell(look, backbone):
     burst = look(views=3)
-    here = burst.views[0].camera.world_from_camera[:3, 3]
-
-    def moved(view):
-        pose = view.camera.world_from_camera.copy()
-        pose[:3, 3] = here
-        return replace(view, camera=Camera(view.camera.K, pose))
-
-    require_one_unit(Encoder(backbone).encode(Burst([moved(each) for each in burst.views])))
+    here = burst.views[0].camera.world_from_camera[:, 3:]
+    require_one_unit(Encoder(backbone).encode(with_cameras(burst, lambda pose: np.hstack([pose[:, :3], here]))))
 
 
 def test_a_view_of_something_elsewhere_is_named(look, backbone):
@@ -86,11 +80,28 @@ def test_a_view_of_something_elsewhere_is_named(look, backbone):
     assert rest == [()] * 4
     assert [(fault.kind, "1 m from where" in fault.detail) for fault in odd] == [("elsewhere", True)]
     require_one_unit(encoded)
+    require_one_place(encoded)
 
 
 def test_views_of_one_object_are_nowhere_else(look, backbone):
     burst = look(views=8)
-    assert incoherent(burst, Encoder(backbone).encode(burst)) == ((),) * 8
+    encoded = Encoder(backbone).encode(burst)
+    assert incoherent(burst, encoded) == ((),) * 8
+    require_one_place(encoded)
+
+
+@pytest.mark.parametrize("change", [np.linalg.inv, lambda pose: pose @ np.diag([1.0, -1, -1, 1])], ids=["inverse", "OpenGL's axes"])
+@pytest.mark.parametrize("views", [2, 3, 8])
+def test_cameras_by_which_the_object_is_everywhere_are_refused(look, backbone, change, views):
+    encoded = Encoder(backbone).encode(with_cameras(look(views=views, world_from_object=at(0.6, 0.3, 0)), change))
+    with pytest.raises(InvalidInput, match=r"^views: each has the object in another place, .* not the inverse and not OpenGL's axes$"):
+        require_one_place(encoded)
+
+
+def test_an_object_that_moved_between_all_views_is_refused(look, backbone):
+    views = [look(views=4, world_from_object=at(0.5 * index, 0, 0)).views[index] for index in range(4)]
+    with pytest.raises(InvalidInput, match="where it did not move"):
+        require_one_place(Encoder(backbone).encode(Burst(views)))
 
 
 def test_the_same_image_again_is_named_whatever_its_camera(look, backbone):

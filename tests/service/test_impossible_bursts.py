@@ -79,6 +79,7 @@ CAMERAS = {
         "views[0].world_from_camera",
         "from the world's origin",
     ),
+    "OpenGL's axes": (edited(world_from_camera=lambda pose: pose @ np.diag([1, -1, -1, 1])), "views", "OpenGL's axes"),
     "a sheared rotation": (
         edited(world_from_camera=lambda pose: pose @ (np.eye(4) + 0.01 * np.eye(4, k=1))),
         "views[0].world_from_camera",
@@ -94,10 +95,12 @@ def test_cameras_that_cannot_be_are_refused(client, look, parts, case):
         refused(client.post(address, files=parts(look(), edit)), 422, field, word)
 
 
-def test_a_scan_in_another_unit_makes_no_category(client, look, parts):
+@pytest.mark.parametrize("case", ["translations in millimetres", "OpenGL's axes"])
+def test_a_scan_with_wrong_cameras_makes_no_category(client, look, parts, case):
+    edit, field, word = CAMERAS[case]
     scan = client.post("/v1/observations", files=parts(look())).json()["scan"]
-    assert client.post(f"/v1/scans/{scan['id']}/views", files=parts(look(), edited(world_from_camera=millimetres))).status_code == 200
-    refused(client.post(f"/v1/scans/{scan['id']}/complete"), 422, "views", "world_from_camera says")
+    assert client.post(f"/v1/scans/{scan['id']}/views", files=parts(look(), edit)).status_code == 200
+    refused(client.post(f"/v1/scans/{scan['id']}/complete"), 422, field, word)
     assert client.get("/v1/categories").json()["categories"] == []
 
 
