@@ -96,7 +96,7 @@ def find_sequences(root: Path) -> list[Sequence]:
     """Every sequence below `root`, links followed, sorted by path. Raises InvalidInput where there is none."""
     folders = sorted(folder for folder, files in folders_below(root) if ABOUT in files)
     if not folders:
-        other = f"or another layout by its prefix, such as transforms:{root}"
+        other = f"or another layout by its prefix, such as transforms:{root} where it holds a transforms.json"
         raise InvalidInput("data", f"no {ABOUT} below {root}; expected CATEGORY/INSTANCE/{ABOUT}, {other}")
     return [_read_sequence(folder) for folder in folders]
 

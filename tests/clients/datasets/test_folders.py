@@ -69,7 +69,7 @@ def test_masks_are_given_only_when_asked_for(recordings: list[Sequence]) -> None
 
 
 def test_a_folder_without_sequences_is_named(tmp_path: Path) -> None:
-    with pytest.raises(InvalidInput, match=r"sequence\.json"):
+    with pytest.raises(InvalidInput, match=r"sequence\.json.* where it holds a transforms\.json"):
         find_sequences(tmp_path)
 
 
