@@ -70,6 +70,7 @@ def test_the_report_shows_every_encounter_with_its_pictures(record: EpisodeRecor
         assert (pictures.scanned is None) == (encounter.learnt is None)
     assert "false novel: its category was in the memory" in text
     assert "recognised as car" in text
+    assert "centre is off is said of the object itself, not of the box" in text
 
 
 def test_a_long_episode_shows_its_charts_and_what_went_worst(record: EpisodeRecord, tmp_path: Path) -> None:
