@@ -15,8 +15,8 @@ from core.errors import Conflict
 from store.keys import Keys
 from store.memory import Memory
 
-OBJECTS = 12
-"""That the robot meets."""
+OBJECTS = 15
+"""That the robot meets, as many as in `make demo`."""
 LIMIT_S = 1800.0
 """Then it is stopped, whatever it does."""
 STOP_S = 5.0
