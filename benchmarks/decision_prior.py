@@ -28,6 +28,7 @@ from clients.datasets.folders import find_sequences
 from core.backbones import load_backbone
 from core.calibration import SHIPPED
 from core.encode import Encoder
+from core.errors import InvalidInput
 from core.evidence import MEMBERS, Comparison, Matched, Usual
 from core.views import FloatArray
 
@@ -64,6 +65,8 @@ def write(out: Path, fingerprint: str, labels: NDArray[np.intp], match: FloatArr
         by_pose = {each: agreement[founder, burst] for each, founder in oldest.items()}
         wrong.append([(found[each], by_pose[each]) for each in found if each != labels[burst]])
         own += [(found[each], by_pose[each]) for each in found if each == labels[burst]]
+    if not all(np.isfinite(pose) for pairs in [own, *wrong] for _, pose in pairs):
+        raise InvalidInput("--data", "holds bursts without depth or cameras: their poses tell nothing; all need both")
     tokens, poses = (np.array([pair[part] for pairs in wrong for pair in pairs]) for part in (0, 1))
     weight = float(tokens.std() / poses.std())
 

@@ -63,7 +63,7 @@ def by_agreement(
     agreement = DenseAgreement(*pair.surfaces, pair.descriptors, config.dense, seed)
     promising = distinct(guesses, agreement.score(guesses), config.distinct_deg, config.refined)
     clock.lap("score")
-    descriptors = pair.steady_descriptors if config.steady else pair.descriptors
+    descriptors = _refining(pair, config)
     refined = DenseAgreement(*pair.surfaces, descriptors, config.dense, seed).refine(guesses.select(promising))
     views = view_agreement(refined.rotation.numpy(), pair.relative, pair.similarity, config.view_deg)
     weight = min(config.view_weight * len(pair.target), config.most_view_weight)
@@ -95,5 +95,10 @@ def by_agreement(
 
 def axis_scales_by_agreement(estimate: PoseEstimate, pair: MatchedPair, config: BestConfig, world_from_object: Sim3, seed: int) -> Affine9:
     """target_from_object: the 9-D transform of what a 7-D one lays on each other. Raises NoPose where that does not determine it."""
-    agreement = DenseAgreement(*pair.surfaces, pair.steady_descriptors, config.polish or config.dense, seed)
+    agreement = DenseAgreement(*pair.surfaces, _refining(pair, config), config.polish or config.dense, seed)
     return agreement.stretch(estimate.target_from_reference, world_from_object)
+
+
+def _refining(pair: MatchedPair, config: BestConfig) -> tuple[list[FloatArray], list[FloatArray]]:
+    """The descriptors that a hypothesis is refined by, of the reference and of the target."""
+    return pair.steady_descriptors if config.steady else pair.descriptors

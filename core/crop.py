@@ -86,7 +86,7 @@ def close_window(component: NDArray[np.bool_], window: Window, margin: float) ->
     rows, columns = np.flatnonzero(component.any(axis=1)), np.flatnonzero(component.any(axis=0))
     step = window.size / component.shape[0]
     height, width = (rows[-1] + 1 - rows[0]) * step, (columns[-1] + 1 - columns[0]) * step
-    size = round(max(height, width) * (1 + margin))
+    size = max(1, round(max(height, width) * (1 + margin)))
     centre_x = window.x0 + (columns[0] + columns[-1] + 1) * step / 2
     centre_y = window.y0 + (rows[0] + rows[-1] + 1) * step / 2
     return Window(round(centre_x - size / 2), round(centre_y - size / 2), size)

@@ -44,7 +44,7 @@ def _keep(db: Database, copy: Path) -> None:
         with closing(sqlite3.connect(partial)) as target:
             db.conn.backup(target)
         sync(partial)
-        partial.replace(copy)
+        partial.rename(copy)
         sync(copy.parent)
     except (OSError, sqlite3.Error) as error:
         partial.unlink(missing_ok=True)

@@ -196,7 +196,7 @@ def next_view(
 
 @app.command()
 def load(
-    robots: Annotated[list[int], typer.Option(help="Robots at once; may be repeated.")] = [1, 2, 4, 8, 16, 32],  # noqa: B006
+    robots: Annotated[list[int], typer.Option(min=1, help="Robots at once; may be repeated.")] = [1, 2, 4, 8, 16, 32],  # noqa: B006
     seconds: Annotated[float, typer.Option(min=1, help="For each number of robots.")] = 45,
     views: Annotated[int, typer.Option(min=1, help="Of an observation.")] = 4,
     data: Samples = None,

@@ -130,17 +130,17 @@ def folders_below(root: Path) -> Iterator[tuple[Path, list[str]]]:
 
 def _load_view(sequence: Sequence, image: Path, cameras: dict[str, Any], masks: bool) -> View:
     rgb = read_rgb(image)
+    mask_file = sequence.path / "mask_visib" / f"{image.stem}_000000.png"
+    mask = read_mask(mask_file) if masks and mask_file.exists() else None
     key = key_of(image) if cameras else ""
     entry = cameras.get(key)
     if entry is None or "cam_R_w2c" not in entry:
-        return view_of(image, rgb)
+        return view_of(image, rgb, mask=mask)
     within = f"{sequence.path / CAMERAS}: {key}."
     depth_file = sequence.path / "depth" / f"{image.stem}.png"
     depth_m = None
     if depth_file.exists():
         depth_m = read_depth(depth_file, float(read_numbers(entry, "depth_scale", (), within)) / 1000)
-    mask_file = sequence.path / "mask_visib" / f"{image.stem}_000000.png"
-    mask = read_mask(mask_file) if masks and mask_file.exists() else None
     return view_of(image, rgb, depth_m, read_camera(entry, within), mask)
 
 

@@ -10,6 +10,7 @@ import pytest
 
 from benchmarks.decision_prior import write
 from core.calibration import SHIPPED
+from core.errors import InvalidInput
 from core.evidence import Usual, cohort_level
 
 LABELS = np.array([0, 0, 1, 1, 2])
@@ -50,3 +51,11 @@ def test_every_burst_gives_a_rival_and_those_with_another_of_their_kind_a_right_
 
 def test_what_ships_has_the_fields_that_are_written(figures: dict) -> None:
     assert json.loads(SHIPPED.read_text()).keys() == figures.keys()
+
+
+def test_bursts_that_no_pose_is_found_for_are_refused(tmp_path: Path) -> None:
+    agreement = AGREEMENT.copy()
+    agreement[0, 1] = np.nan
+    with pytest.raises(InvalidInput, match="all need both"):
+        write(tmp_path / "decision.json", "any", LABELS, MATCH, agreement)
+    assert not list(tmp_path.iterdir())

@@ -15,9 +15,10 @@ from benchmarks import soak
 ROOT = Path(__file__).parents[2]
 MINUTES = 0.75
 """Some 450 errands where two other processes are at work."""
-MOST_GROWTH = 0.05
-"""Of 500 MB, over the 220 errands between both ends that are compared: 110 kB an errand, less than two of the images that come with it.
-Over 4,000 errands the process stays as large as it is, but allocators reach that size in steps of 10 MB."""
+MOST_GROWTH = 0.08
+"""Of 500 MB, over the 220 errands between both ends that are compared: 180 kB an errand, less than three of the six images that come with
+it; where a busy machine answers half as many, less than all six. Over 4,000 errands the process stays as large as it is, but allocators
+reach that size in steps of 10 MB."""
 
 
 @pytest.fixture

@@ -42,6 +42,14 @@ def test_nothing_above_the_threshold_is_no_object() -> None:
     assert not largest_component(np.full((5, 5), 0.3), 0.5).any()
 
 
+def test_the_close_window_of_a_speck_in_a_tiny_image_has_a_pixel() -> None:
+    component = np.zeros((16, 16), dtype=bool)
+    component[8, 8] = True
+    window = close_window(component, Window(0, 0, 4), 0.1)
+    assert window.size == 1
+    assert window.cut(np.ones((4, 4), np.float32), 8).shape == (8, 8)
+
+
 def test_the_close_window_is_square_centred_and_ten_percent_larger() -> None:
     component = np.zeros((10, 10), dtype=bool)
     component[4:6, 2:8] = True

@@ -68,6 +68,15 @@ def test_masks_are_given_only_when_asked_for(recordings: list[Sequence]) -> None
     assert load_burst(recordings[0], [0]).views[0].mask is None
 
 
+def test_a_view_without_a_camera_keeps_its_silhouette(recordings: list[Sequence], tmp_path: Path) -> None:
+    folder = tmp_path / "object"
+    shutil.copytree(recordings[0].path, folder)
+    (folder / "scene_camera.json").write_text("{}")
+    view = load_burst(find_sequences(tmp_path)[0], [0], masks=True).views[0]
+    assert view.camera is None
+    assert view.mask is not None
+
+
 def test_a_folder_without_sequences_is_named(tmp_path: Path) -> None:
     with pytest.raises(InvalidInput, match=r"sequence\.json.* where it holds a transforms\.json"):
         find_sequences(tmp_path)
