@@ -41,6 +41,8 @@ SELECT = """
     FROM observations o LEFT JOIN categories c ON c.id = o.category_id AND c.removed_by IS NULL
     LEFT JOIN categories k ON k.id = o.corrected_to AND k.removed_by IS NULL
 """
+OVER = "SELECT id FROM observations ORDER BY rowid DESC LIMIT -1 OFFSET ?"
+"""All but the latest so many."""
 FEATURES = "features.npz"
 
 
@@ -170,7 +172,9 @@ class Observations:
 
     def prune(self) -> None:
         """Drops what is more than the retention allows, which may have become less since."""
-        with self._connection.housekeeping() as db:
+        if not self._connection.rows(OVER, self._connection.retention.observations):
+            return
+        with self._connection.change() as db:
             dropped = self._drop_oldest(db)
         self._connection.remove([self.folder(each) for each in dropped])
 
@@ -179,8 +183,7 @@ class Observations:
 
     def _drop_oldest(self, db: Database) -> list[str]:
         """Within a transaction; returns which, whose folders go once it is committed."""
-        rows = db.query("SELECT id FROM observations ORDER BY rowid DESC LIMIT -1 OFFSET ?", [self._connection.retention.observations])
-        dropped = [row["id"] for row in rows]
+        dropped = [row["id"] for row in db.query(OVER, [self._connection.retention.observations])]
         for each in dropped:
             db.execute("UPDATE instances SET pictures = NULL WHERE pictures = ?", [f"observations/{each}"])
             db.execute("DELETE FROM observations WHERE id = ?", [each])

@@ -119,6 +119,16 @@ def test_limits_hold_after_they_were_lowered(folder: Path, burst: Burst) -> None
         assert [path.name for path in memory.observations.root.iterdir()] == ids[2:]
 
 
+def test_what_a_lower_limit_drops_is_a_change_and_opening_again_is_none(folder: Path, burst: Burst) -> None:
+    with Memory.open(folder) as memory:
+        for _ in range(2):
+            memory.observations.create(NOVEL, burst, {"a": np.arange(3)})
+        before = memory.version
+    for _ in range(2):
+        with Memory.open(folder, Retention(observations=1)) as memory:
+            assert memory.version == before + 1
+
+
 def test_whoever_does_not_know_the_limits_removes_nothing(folder: Path, burst: Burst) -> None:
     with Memory.open(folder, Retention(observations=2000)) as memory, memory._connection.change() as db:
         old = {"created_at": "2000-01-01", "outcome": "novel", "views": 1, "timings_ms": "{}", "features_sha256": "", "files": "{}"}
