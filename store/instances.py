@@ -72,10 +72,13 @@ class Instances:
         return Instance(**row)
 
     def burst(self, instance_id: str) -> Burst:
-        """Its views. Raises NotFound, and Unavailable where they were dropped with their observation or are damaged."""
+        """Its views. Raises NotFound, and Unavailable where they are no longer kept or are damaged."""
         instance = self.get(instance_id)
         if instance.pictures is None:
-            raise Unavailable(f"the views of instance {instance_id!r} are no longer kept: its observation was dropped as one of the oldest")
+            raise Unavailable(
+                f"the views of instance {instance_id!r} are no longer kept: its observation was dropped as one of the oldest, "
+                "`onelook memory reembed` could not use them, or they were not in the archive that it came with"
+            )
         return read_burst(self._connection.root / instance.pictures, files_of(self._connection, instance.pictures))
 
     def forget(self, category_id: str, instance_id: str, *, actor: str | None = None) -> None:

@@ -249,6 +249,15 @@ def test_an_observation_that_cannot_be_computed_goes_with_its_burst(learnt: Memo
     assert learnt.check().ok
 
 
+def test_a_burst_whose_views_it_lost_says_that_it_may_have_been_so(learnt: Memory, category: Category, backbone: Backbone) -> None:
+    (seen,) = learnt.observations.latest(1)
+    (learnt.observations.folder(seen.id) / "000_rgb.png").unlink()
+    learnt.reembed(backbone)
+    _, stripped = learnt.instances.of(category.id)
+    with pytest.raises(Unavailable, match="no longer kept: .*, `onelook memory reembed` could not use them, or"):
+        learnt.instances.burst(stripped.id)
+
+
 def once(work: Callable[[], object]) -> Progress:
     """Does something when it is told for the first time how far it is."""
     left = [work]
