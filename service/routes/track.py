@@ -48,9 +48,9 @@ class Waiting:
 
     def drop(self, frame_id: int) -> None:
         """Counts a frame that is not worked on."""
-        before = self.dropped
-        self.dropped = Dropped(
-            frames=(before.frames if before else 0) + 1, first_id=before.first_id if before else frame_id, last_id=frame_id
+        before = self.dropped or Dropped(frames=0, first_id=frame_id, last_id=frame_id)
+        self.dropped = Dropped(  # one that was taken and then refused is older than those that were dropped meanwhile
+            frames=before.frames + 1, first_id=min(before.first_id, frame_id), last_id=max(before.last_id, frame_id)
         )
 
     async def take(self) -> tuple[FrameMessage, float] | None:

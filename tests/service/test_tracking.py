@@ -215,6 +215,13 @@ def test_what_waits_is_bounded():
     anyio.run(flood)
 
 
+def test_a_frame_that_was_taken_and_refused_is_told_in_order_with_those_dropped_meanwhile():
+    waiting = Waiting()
+    for number in (1, 2, 0):
+        waiting.drop(number)
+    assert (waiting.dropped.frames, waiting.dropped.first_id, waiting.dropped.last_id) == (3, 0, 2)
+
+
 @pytest.fixture
 def solves(monkeypatch):
     """Frames for which the pose was sought anew."""
