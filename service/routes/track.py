@@ -17,7 +17,7 @@ from core.warm import WarmConfig
 from service.agent import Agent
 from service.errors import problem_of, validation_problem
 from service.guarded import admit_socket
-from service.refusals import Busy
+from service.refusals import Busy, TooLate
 from service.schemas.tracking import Announcement, Dropped, FrameAnswer, FrameMessage, Hello, Ready, TrackProblem
 from service.state import running
 from service.tracker import Tracker
@@ -79,7 +79,7 @@ async def track(socket: WebSocket) -> None:
         return
     app.tracks.add(socket)
     try:
-        tracker = await _greet(socket, app.agent, app.warm)
+        tracker = await _greet(socket, app.agent, app.warm, app.settings.deadline_s)
         if tracker is not None:
             await _follow(socket, tracker, app.agent, app.work)
     except WebSocketDisconnect:
@@ -88,16 +88,25 @@ async def track(socket: WebSocket) -> None:
         app.tracks.discard(socket)
 
 
-async def _greet(socket: WebSocket, agent: Agent, warm: WarmConfig) -> Tracker | None:
+async def _greet(socket: WebSocket, agent: Agent, warm: WarmConfig, deadline_s: float) -> Tracker | None:
     """The tracker that `hello` asks for; None where it is refused."""
     try:
-        hello = Hello.model_validate_json(await _text(socket))
+        hello = await _hello(socket, deadline_s)
         tracker = await run_sync(lambda: Tracker(agent, hello.options(), warm))
     except (ValidationError, OneLookError) as error:
         await _refuse(socket, error, status.WS_1008_POLICY_VIOLATION)
         return None
     await _send(socket, Ready(category_id=tracker.category_id, window=hello.window, weight=hello.weight))
     return tracker
+
+
+async def _hello(socket: WebSocket, deadline_s: float) -> Hello:
+    """The first message. Raises WebSocketDisconnect, ValidationError, TooLate."""
+    try:
+        with anyio.fail_after(deadline_s):
+            return Hello.model_validate_json(await _text(socket))
+    except TimeoutError:
+        raise TooLate(f"no `hello` came within {deadline_s:g} s (ONELOOK_DEADLINE_S); connect again and send it first") from None
 
 
 async def _follow(socket: WebSocket, tracker: Tracker, agent: Agent, work: WorkQueue) -> None:

@@ -182,6 +182,19 @@ def test_no_more_are_followed_than_set(settings, backbone):
             assert third.receive_json()["type"] == "ready"
 
 
+def test_who_does_not_say_hello_holds_no_place(settings, backbone):
+    few = settings.model_copy(update={"max_tracks": 1, "deadline_s": 1.0})
+    with TestClient(create_app(few, backbone=backbone)) as client:
+        with client.websocket_connect("/v1/track") as silent:
+            problem = silent.receive_json()["problem"]
+            assert (problem["status"], "ONELOOK_DEADLINE_S" in problem["detail"]) == (503, True)
+            with pytest.raises(WebSocketDisconnect):
+                silent.receive_json()
+        with client.websocket_connect("/v1/track") as second:
+            second.send_json({"type": "hello"})
+            assert second.receive_json()["type"] == "ready"
+
+
 def test_frames_that_come_too_fast_are_dropped_oldest_first_and_told(settings, backbone, look, parts, camera_round):
     gate, views = Gate(backbone), camera_round(PLACED, 8)
     with TestClient(create_app(settings, backbone=gate)) as client, client.websocket_connect("/v1/track") as socket:
