@@ -32,6 +32,8 @@ from store.records import Category
 
 MAX_MANIFEST_BYTES = 32_000_000
 """A category takes some kilobytes, an instance half of one."""
+PLACES = ("cloud_m", "world_from_object", "extent_m", "symmetries")
+"""Arrays of a reference; others may say by NaN that something was not measured."""
 
 
 @dataclass(frozen=True)
@@ -201,6 +203,8 @@ def _judge_category(folder: Path, part: CategoryEntry, category_id: str, manifes
         files = {name: entry.sum for name, entry in part.files.items()}
         name, _ = arrays_file(files)
         arrays = untrusted.arrays((folder / name).read_bytes(), name)
+        for field in PLACES:
+            _require(bool(np.isfinite(arrays[field]).all()), f"{field} of {name} is finite")
         burst, reference = read_burst(folder, files), Reference.from_arrays(arrays)
         made: tuple[CategoryEntry | InstanceEntry | GoalEntry, ...] = (part, *part.instances, *part.goals)
         for dated in made:

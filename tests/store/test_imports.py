@@ -161,6 +161,21 @@ def test_a_reference_that_does_not_fit_its_views_is_refused(second: Memory, arch
     assert nothing_changed(second)
 
 
+@pytest.mark.parametrize(
+    ("field", "shape"), [("cloud_m", (5, 3)), ("world_from_object", (4, 4)), ("extent_m", (3,)), ("symmetries", (1, 3, 3))]
+)
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_a_reference_that_is_nowhere_is_refused(
+    second: Memory, archive: Path, category: Category, tmp_path: Path, field: str, shape: tuple[int, ...], value: float
+) -> None:
+    name = f"categories/{category.id}/reference.npz"
+    entries = unpacked(archive)
+    arrays = dict(np.load(io.BytesIO(entries[name]))) | {field: np.full(shape, value)}
+    with pytest.raises(InvalidInput, match=rf"{category.id} cannot be read .*{field} of reference\.npz is finite"):
+        second.import_archive(packed(tmp_path / "evil.zip", with_entry(entries, name, npz(**arrays))))
+    assert nothing_changed(second)
+
+
 def test_a_picture_of_another_size_than_any_camera_s_is_refused(second: Memory, archive: Path, category: Category, tmp_path: Path) -> None:
     name = f"categories/{category.id}/000_rgb.png"
     entries = unpacked(archive)
