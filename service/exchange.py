@@ -23,8 +23,9 @@ CLOCKED = {"list_scans", "get_scan", "list_observations", "get_observation", "li
 class MemoryRoute(GuardedRoute):
     """A route that reads or changes the memory.
 
-    A GET is answered with an ETag that the memory's version gives, or the answer itself where it is one of CLOCKED, and with 304 where the
-    caller has that already. A POST with an Idempotency-Key is carried out once: its repetitions get the first answer again.
+    A GET is answered with an ETag of the service's run and the memory's version, or of the answer itself where it is one of CLOCKED, and
+    with 304 where the caller has that already. A POST with an Idempotency-Key is carried out once: its repetitions get the first answer
+    again.
     """
 
     def around(self, answer: Answering) -> Answering:
@@ -42,9 +43,9 @@ class MemoryRoute(GuardedRoute):
 
 
 async def _conditional(request: Request, answer: Answering) -> Response:
-    memory = running(request).agent.memory
-    version = await run_sync(lambda: memory.version)  # before the answer is made: it may be newer than its tag, never older
-    tag = f'W/"{version}"'
+    app = running(request)
+    version = await run_sync(lambda: app.agent.memory.version)  # before the answer is made, which may be newer than its tag, never older
+    tag = f'W/"{app.run_id}-{version}"'  # a later run may be of another OneLook or a restored memory
     return _tagged(Response(status_code=304) if _has(request, tag) else await answer(request), tag)
 
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import uuid
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from pydantic import BaseModel
 from starlette.datastructures import QueryParams
@@ -39,6 +40,8 @@ class Running:
     """Each follows an object."""
     warm: WarmConfig
     """How objects are followed."""
+    run_id: str = field(default_factory=lambda: uuid.uuid4().hex)
+    """Another one at each start."""
 
 
 def running(connection: HTTPConnection) -> Running:

@@ -19,7 +19,7 @@ from store import backup, records
 class MemoryInfo(BaseModel):
     """What a memory holds, what it was made with, and how it decides."""
 
-    version: int = Field(description="Grows with each change; the ETag of most reads.", examples=[42])
+    version: int = Field(description="Grows with each change.", examples=[42])
     backbone: str | None = Field(examples=["dinov2-s14"])
     fingerprint: str | None = Field(description="Of the backbone's weights, layer and preprocessing.")
     score: Score

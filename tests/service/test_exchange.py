@@ -175,6 +175,17 @@ def test_a_change_makes_another_tag(client, learn):
     assert after.headers["etag"] != before
 
 
+def test_after_a_start_the_memory_may_be_another_one_of_the_same_version(settings, backbone):
+    def of_memory(name):
+        with TestClient(create_app(settings.model_copy(update={"data_dir": settings.data_dir / name}), backbone=backbone)) as client:
+            version = client.get("/v1/memory").json()["version"]
+            return version, client.get("/v1/categories").headers["etag"]
+
+    (version, tag), (same_version, other_tag) = of_memory("first"), of_memory("second")
+    assert version == same_version
+    assert tag != other_tag
+
+
 def in_two_months(monkeypatch):
     """Sets the clock of scans and of undoing forward; nobody prunes."""
     later = datetime.now(timezone.utc) + timedelta(days=60)
