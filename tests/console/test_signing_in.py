@@ -50,6 +50,20 @@ def test_a_wrong_key_is_told(tab):
     expect(page.get_by_role("alert")).to_contain_text("no key of this service")
 
 
+def test_a_session_that_ends_while_one_watches_leads_to_the_sign_in(tab, keys):
+    def end_session(events):
+        assert page.context.request.post(f"{tab.own}/sign-out").ok
+        events.continue_()
+
+    tab.expects.add(401)
+    page = tab.open("/sign-in")
+    page.route("**/v1/events*", end_session)
+    with page.expect_response("**/v1/events*") as refused:
+        sign_in(page, keys[1]["viewer"])
+    assert refused.value.status == 401
+    expect(page.get_by_role("heading", name="Sign in")).to_be_visible()
+
+
 def test_a_viewer_is_offered_nothing_to_change(tab, keys):
     page = tab.open("/memory")
     sign_in(page, keys[1]["viewer"])

@@ -33,7 +33,11 @@ function refreshSide() {
 
 const events = new EventSource(`/v1/events?after=${live.dataset.after}`);
 events.addEventListener("open", () => connection("live", true));
-events.addEventListener("error", () => connection("not connected, trying again", false));
+events.addEventListener("error", () => {
+  const refused = events.readyState === EventSource.CLOSED; // by an answer, such as 401: a browser does not try that again
+  connection(refused ? "not connected, load the page again" : "not connected, trying again", false);
+  if (refused) refreshSide(); // and that leads to the sign-in where the session has ended
+});
 events.addEventListener("observation", (event) => {
   const { id } = JSON.parse(event.data);
   shown = shown.then(() => show(id)).catch(() => {});
