@@ -141,13 +141,15 @@ def _no_connection(why: Exception, url: str) -> Unreachable:
 
 
 def _reason(error: BaseException) -> str:
-    """What the operating system or TLS said first: the exceptions of asyncio above it do not repeat it."""
-    said = str(error) or type(error).__name__
-    beneath = error.__cause__ or error.__context__
-    while beneath is not None:
+    """What the operating system or TLS said first: the exceptions of asyncio above it do not repeat it.
+
+    Contexts are not followed: they lead to what the caller may be handling meanwhile. httpcore has what it was raised for among its `args`.
+    """
+    said, beneath = str(error) or type(error).__name__, error
+    while found := beneath.__cause__ or next((each for each in beneath.args if isinstance(each, BaseException)), None):
+        beneath = found
         if isinstance(beneath, OSError) and str(beneath):
             said = str(beneath)
-        beneath = beneath.__cause__ or beneath.__context__
     return said
 
 

@@ -134,7 +134,7 @@ def _load_view(sequence: Sequence, image: Path, cameras: dict[str, Any], masks: 
     mask = read_mask(mask_file) if masks and mask_file.exists() else None
     key = key_of(image) if cameras else ""
     entry = cameras.get(key)
-    if entry is None or "cam_R_w2c" not in entry:
+    if entry is None or (isinstance(entry, Mapping) and "cam_R_w2c" not in entry):
         return view_of(image, rgb, mask=mask)
     within = f"{sequence.path / CAMERAS}: {key}."
     depth_file = sequence.path / "depth" / f"{image.stem}.png"

@@ -28,7 +28,7 @@ def read_vertices(path: Path) -> FloatArray:
     head, mark, body = content.partition(b"end_header\n")
     lines = [line.split() for line in head.decode("ascii", "replace").splitlines()]
     elements = [line[1:] for line in lines if line[:1] == ["element"]]
-    if not mark or lines[:1] != [["ply"]] or not elements or elements[0][0] != "vertex":
+    if not mark or lines[:1] != [["ply"]] or not elements or elements[0][:1] != ["vertex"]:
         raise InvalidInput(str(path), "is not a PLY file whose first element is vertex")
     try:
         count = int(elements[0][1])
@@ -42,5 +42,5 @@ def read_vertices(path: Path) -> FloatArray:
         kind = np.dtype([(name, ORDERS[layout] + TYPES[number]) for name, number in properties])
         vertices = np.frombuffer(body, kind, count)
         return np.stack([vertices[axis].astype(float) for axis in "xyz"], axis=1)
-    except (IndexError, KeyError, ValueError) as error:
+    except (IndexError, KeyError, OverflowError, ValueError) as error:
         raise InvalidInput(str(path), f"is a PLY file whose vertices cannot be read ({error})") from None

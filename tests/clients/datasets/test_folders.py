@@ -114,6 +114,7 @@ def edit(file: str, change: Callable[[Any], object]) -> Callable[[Path], object]
             "expected a number",
         ),
         (edit("scene_camera.json", lambda cameras: cameras.update({"0": 5})), "scene_camera.json: 0.cam_R_w2c", "expected 9 numbers"),
+        (edit("scene_camera.json", lambda cameras: cameras.update({"1": [5]})), "scene_camera.json: 1.depth_scale", r"found \[5\]"),
         (edit("scene_gt.json", lambda truth: truth.update({"0": truth["0"][0]})), "scene_gt.json: 0", "expected a list"),
         (edit("sequence.json", lambda about: about.update(symmetries=4)), "sequence.json: symmetries", "expected a list, found 4"),
         (lambda folder: [image.unlink() for image in (folder / "rgb").iterdir()], "", "has no folder rgb with images"),
@@ -131,7 +132,7 @@ def test_what_is_wrong_with_a_recording_is_named(
     damage(folder)
     with pytest.raises(InvalidInput, match=says) as caught:
         load_burst(find_sequences(folder)[0])
-    assert caught.value.field == str(folder / field) if field else str(folder)
+    assert caught.value.field == str(folder / field)
 
 
 @pytest.mark.parametrize(("content", "says"), [(None, "is no file"), (b"", "is empty"), (b"text", "cannot be decoded")])

@@ -32,10 +32,12 @@ def test_vertices_are_read_of_text_and_of_either_order_of_bytes(tmp_path: Path) 
     [
         (b"", "is not a PLY file whose first element is vertex"),
         (b"ply\nformat ascii 1.0\nelement face 1\nend_header\n", "is not a PLY file whose first element is vertex"),
+        (b"ply\nformat ascii 1.0\nelement\nend_header\n", "is not a PLY file whose first element is vertex"),
         (b"ply\nelement vertex 1\n" + PROPERTIES + b"end_header\n", "cannot be read"),
         (b"ply\nformat ascii 1.0\nelement vertex\n" + PROPERTIES + b"end_header\n", "cannot be read"),
         (b"ply\nformat ascii 1.0\nelement vertex two\n" + PROPERTIES + b"end_header\n", "cannot be read"),
         (b"ply\nformat binary_little_endian 1.0\nelement vertex 9\n" + PROPERTIES + b"end_header\n....", "cannot be read"),
+        (b"ply\nformat binary_little_endian 1.0\nelement vertex " + b"9" * 20 + b"\n" + PROPERTIES + b"end_header\n", "cannot be read"),
     ],
 )
 def test_a_file_without_readable_vertices_is_named(tmp_path: Path, content: bytes, says: str) -> None:
