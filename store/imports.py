@@ -210,8 +210,7 @@ def _judge_category(folder: Path, part: CategoryEntry, category_id: str, manifes
         for dated in made:
             datetime.fromisoformat(dated.created_at)
         for goal in part.goals:
-            pose = Sim3.from_matrix(sim3_from_json(goal.target_from_reference).as_matrix())
-            _require(bool(np.isfinite(pose.translation).all()), "its goals are somewhere")
+            _require_pose(sim3_from_json(goal.target_from_reference))
         _require(len(reference.views) == len(burst), "its reference has as many views as pictures")
         _require(reference.fingerprint == manifest.fingerprint, "its reference was made with the archive's backbone")
         _require(reference.box.extent_m.shape == (3,), "its box has three edges")
@@ -249,6 +248,13 @@ def _require_sound(blobs: Row, index: int, instance: InstanceEntry, dim: int, ve
         parts = parts_from_blob(blobs["parts"], instance.views, dim)
         _require(version == 1 or parts.shape[1] == PARTS, f"instance {index} has {PARTS} parts a view")
         _require(parts.shape[1] > 0 and bool(np.isfinite(parts).all()), f"the parts of instance {index} are finite")
+
+
+def _require_pose(pose: Sim3) -> None:
+    """By its parts: their product may be the matrix of a similarity though they are none of it."""
+    _require(pose.rotation.shape == (3, 3) and pose.translation.shape == (3,), "its goals are transforms of space")
+    _require(bool(np.isfinite(pose.translation).all()), "its goals are somewhere")
+    _require(bool(np.isclose(Sim3.from_matrix(pose.as_matrix()).scale, pose.scale)), "its goals have a scale and a rotation")
 
 
 def _require(holds: bool, what: str) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import math
 import stat
 import struct
 import zipfile
@@ -260,11 +261,9 @@ def test_another_number_of_parts_is_refused(second: Memory, archive: Path, categ
     assert nothing_changed(second)
 
 
-POSE = '{"scale": 1, "rotation": [[1, 0, 0], [0, 1, 0], [0, 0, 1]], "translation": [0, 0, 0.5]}'
-
-
-def goal(manifest: dict, pose: str) -> None:
-    manifest["categories"][0]["goals"][0].update(target_from_reference=pose)
+def goal(manifest: dict, scale: float = 1, rotation: object = ((1, 0, 0), (0, 1, 0), (0, 0, 1)), translation: object = (0, 0, 0.5)) -> None:
+    pose = {"scale": scale, "rotation": rotation, "translation": translation}
+    manifest["categories"][0]["goals"][0].update(target_from_reference=json.dumps(pose))
 
 
 CHANGES: dict[str, Callable[[dict], object]] = {
@@ -277,9 +276,12 @@ CHANGES: dict[str, Callable[[dict], object]] = {
     "the same id twice": lambda manifest: manifest["categories"].append(manifest["categories"][0]),
     "no instances": lambda manifest: manifest["categories"][0].update(instances=[]),
     "an instance that came by magic": lambda manifest: manifest["categories"][0]["instances"][0].update(how="magic"),
-    "a goal that is no pose": lambda manifest: goal(manifest, "{}"),
-    "a goal that stretches": lambda manifest: goal(manifest, POSE.replace("[0, 0, 1]", "[0, 0, 2]")),
-    "a goal that is nowhere": lambda manifest: goal(manifest, POSE.replace("0.5", "Infinity")),
+    "a goal that is no pose": lambda manifest: manifest["categories"][0]["goals"][0].update(target_from_reference="{}"),
+    "a goal that stretches": lambda manifest: goal(manifest, rotation=[[1, 0, 0], [0, 1, 0], [0, 0, 2]]),
+    "a goal whose rotation shrinks": lambda manifest: goal(manifest, 2, [[0.5, 0, 0], [0, 0.5, 0], [0, 0, 0.5]]),
+    "a goal that is nowhere": lambda manifest: goal(manifest, translation=[0, 0, math.inf]),
+    "a goal on a line": lambda manifest: goal(manifest, translation=[0.5]),
+    "a goal with rotations": lambda manifest: goal(manifest, rotation=[[[1, 0, 0], [0, 1, 0], [0, 0, 1]]]),
     "no arrays": lambda manifest: manifest["categories"][0]["files"].pop("reference.npz"),
     "a time that never was": lambda manifest: manifest["categories"][0].update(created_at="2026-02-30T12:00:00.000+00:00"),
 }
