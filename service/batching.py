@@ -26,7 +26,10 @@ LOOK_S = 0.1
 """How often who waits for a pass looks whether it is still wanted."""
 CPU_ALLOCATOR = "can't allocate memory"
 """What torch's error says there, which is of no class of its own."""
-HANGS = "if this does not end, it hangs, and the service has to start anew: `onelook serve` ends by itself for that, but not with --cluster"
+HANGS = (
+    "if this does not end, it hangs, and the service has to start anew: `onelook serve` ends by itself for that; "
+    "with --cluster only encoders are replaced"
+)
 log = logging.getLogger("onelook")
 
 
