@@ -11,6 +11,12 @@ from clients import command
 from clients.cli import app
 
 
+@pytest.fixture(autouse=True)
+def quiet(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No log on the stream of a command that has ended."""
+    monkeypatch.setattr("logging.config.dictConfig", lambda config: None)
+
+
 def test_without_the_terminal_libraries(monkeypatch: pytest.MonkeyPatch) -> None:
     for name in [name for name in sys.modules if name.startswith("clients.cli")]:
         monkeypatch.delitem(sys.modules, name)
