@@ -29,6 +29,8 @@ ELSEWHERE = 1.0
 OpenGL's axes taken for OpenCV's, most views exceed it in 97 % of bursts of 3 views and in all of 8; with inverse poses in 83 and 91 %."""
 MOST_ELSEWHERE = 0.5
 """Share of the views that may have the object elsewhere: with more, none of them says where it is."""
+LEAST_MEASURED = 0.5
+"""Share of what was found that must have depth, in the median view: the middle of less, of a shiny object say, is not the object's."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +46,8 @@ class _Sights:
     """Of the object's points by depth, shape (V, 3)."""
     extents_m: FloatArray
     """Of these points, shape (V,)."""
+    measured: FloatArray
+    """Share of the patches that have such points, shape (V,)."""
 
 
 def require_one_unit(encoded: EncodedBurst) -> None:
@@ -77,7 +81,7 @@ def require_one_place(encoded: EncodedBurst) -> None:
     Inverse cameras around the world's origin may escape: by them the object only turns.
     """
     sights = _sights(encoded)
-    if sights is None:
+    if sights is None or np.median(sights.measured) < LEAST_MEASURED:
         return
     away_m, extent_m = _away_m(sights), float(np.median(sights.extents_m))
     if (away_m > ELSEWHERE * extent_m).mean() > MOST_ELSEWHERE:
@@ -133,6 +137,7 @@ def _sights(encoded: EncodedBurst) -> _Sights | None:
         np.array([direction for _, direction in rays]),
         np.array([np.median(cloud, axis=0) for cloud in clouds]),
         np.array([cloud_extent_m(cloud) for cloud in clouds]),
+        np.array([view.trusted.mean() for _, view in shown]),
     )
 
 

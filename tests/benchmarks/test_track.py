@@ -71,14 +71,13 @@ def follow(recorded: Path, then: Callable[[ServerConnection], Awaitable[None]]) 
     return asyncio.run(stream())
 
 
-def test_a_problem_is_no_late_answer(recorded: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_problem_is_no_late_answer(recorded: Path) -> None:
     problem = {"type": f"{PROBLEM_URN}unavailable", "status": 503, "title": "Busy", "detail": "all lanes are taken"}
 
     async def tell(socket: ServerConnection) -> None:
         await socket.send(json.dumps({"type": "problem", "problem": problem}))
         await socket.wait_closed()
 
-    monkeypatch.setattr(track, "LATE_S", 1.0)
     with pytest.raises(UnavailableProblem, match="all lanes are taken"):
         follow(recorded, tell)
 

@@ -104,6 +104,16 @@ def test_an_object_that_moved_between_all_views_is_refused(look, backbone):
         require_one_place(Encoder(backbone).encode(Burst(views)))
 
 
+def test_depth_on_another_spot_of_the_object_in_each_view_does_not_tell(look, backbone):
+    encoded = Encoder(backbone).encode(look(views=4))
+
+    def spot(view, place):
+        kept = np.arange(len(view.points_m)) == place * (len(view.points_m) - 1) // 3
+        return replace(view, points_m=np.where(kept[:, None], view.points_m, np.nan))
+
+    require_one_place(replace(encoded, views=tuple(spot(view, place) for place, view in enumerate(encoded.views))))
+
+
 def test_the_same_image_again_is_named_whatever_its_camera(look, backbone):
     burst = look(views=4)
     stuck = Burst([*burst.views, burst.views[1], replace(burst.views[2], camera=burst.views[3].camera)])
