@@ -116,7 +116,7 @@ def run(
         rounds: decisions timed at each size.
         exact_up_to: categories up to which the exact rule is computed as well, in time that grows with their number.
 
-    Raises InvalidInput where sizes do not grow, the backbone ships no statistics, or `data` lacks two objects of a kind.
+    Raises InvalidInput where sizes do not grow or the backbone ships no statistics, and of `data` as `labels_of` does.
     """
     if list(categories) != sorted(set(categories)) or categories[0] < 1:
         raise InvalidInput("categories", f"expected growing numbers, found {', '.join(map(str, categories))}")

@@ -183,7 +183,8 @@ def memory(settings: Settings) -> Finding:
     same = made_with == settings.backbone if loaded is None else fingerprint == loaded.fingerprint
     if fingerprint is not None and not same:
         found = f"{settings.data_dir} was made with {made_with} (fingerprint {fingerprint[:12]}), which is not this {settings.backbone}"
-        remedy = f"set ONELOOK_BACKBONE={made_with}, or another ONELOOK_DATA_DIR, or run: onelook memory reembed"
+        first = "" if made_with == settings.backbone else f"ONELOOK_BACKBONE={made_with}, or "
+        remedy = f"set {first}another ONELOOK_DATA_DIR, or run: onelook memory reembed"
         return Finding("memory", State.bad, found, remedy)
     return Finding("memory", State.good, f"{count} categories in {settings.data_dir}; `onelook memory check` reads all of it")
 
