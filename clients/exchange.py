@@ -124,15 +124,15 @@ def retry_after_s(headers: Mapping[str, str]) -> float | None:
 def _failure(came: httpx.Response | httpx.TransportError, call: Call[Any], url: str) -> Exception:
     if isinstance(came, httpx.Response):
         return problem_of(came)
-    if isinstance(came, (httpx.ConnectError, httpx.ConnectTimeout)):
-        return _no_connection(came, url)
-    if isinstance(came, httpx.TimeoutException):
+    if isinstance(came, httpx.TimeoutException) and not isinstance(came, httpx.ConnectTimeout):
         return TooSlow(f"{url} did not answer {call.method} {call.path} in time; send fewer views, or allow more time")
     return broken(came, url)
 
 
 def broken(why: Exception, url: str) -> Unreachable:
-    """The exception for a connection that did not last."""
+    """The exception for a connection that was not made, or did not last."""
+    if isinstance(why, (httpx.ConnectError, httpx.ConnectTimeout)):
+        return _no_connection(why, url)
     return Unreachable(f"the connection to {url} broke ({_reason(why)}); look at the service's log")
 
 
