@@ -220,6 +220,12 @@ def test_a_failure_that_says_nothing_is_told_by_its_kind(connect: Connect) -> No
         robot.categories()
 
 
+def test_a_connection_that_did_not_last_broke(connect: Connect) -> None:
+    robot, _ = connect(httpx.ReadError("reset by peer"), retry=Retry(attempts=1))
+    with pytest.raises(errors.Unreachable, match=r"the connection to .* broke \(reset by peer\); look at the service's log"):
+        robot.categories()
+
+
 def test_retry_after_may_be_a_date() -> None:
     later = format_datetime(datetime.now(timezone.utc) + timedelta(seconds=60), usegmt=True)
     assert retry_after_s({"retry-after": later}) == pytest.approx(60, abs=2)

@@ -86,7 +86,7 @@ def test_without_a_service_the_remedy_is_said() -> None:
     robot = RobotClient("http://127.0.0.1:9")
     with pytest.raises(errors.Unreachable, match="onelook serve"), robot.track():
         pass
-    with pytest.raises(errors.Unreachable, match="broke"):
+    with pytest.raises(errors.Unreachable, match="onelook serve"):
         next(robot.events())
 
 
