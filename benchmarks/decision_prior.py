@@ -51,7 +51,7 @@ def write(out: Path, fingerprint: str, labels: NDArray[np.intp], match: FloatArr
     Args:
         labels: the category of each burst, shape (N,): two or more, one of them with two bursts.
         match: matches of all pairs, shape (N, N).
-        agreement: of the reference of burst i with burst j at the best pose, shape (N, N); all bursts must have depth and cameras.
+        agreement: of the reference of burst i with burst j at the best pose, shape (N, N); all bursts need depth, cameras and two views.
     """
     founders = [_founders(labels, burst) for burst in range(len(labels))]
     others = np.array(
@@ -66,7 +66,7 @@ def write(out: Path, fingerprint: str, labels: NDArray[np.intp], match: FloatArr
         wrong.append([(found[each], by_pose[each]) for each in found if each != labels[burst]])
         own += [(found[each], by_pose[each]) for each in found if each == labels[burst]]
     if not all(np.isfinite(pose) for pairs in [own, *wrong] for _, pose in pairs):
-        raise InvalidInput("--data", "holds bursts without depth or cameras: their poses tell nothing; all need both")
+        raise InvalidInput("--data", "holds bursts of one view, or without depth or cameras, which have no poses; leave them out")
     tokens, poses = (np.array([pair[part] for pairs in wrong for pair in pairs]) for part in (0, 1))
     weight = float(tokens.std() / poses.std())
 

@@ -56,6 +56,6 @@ def test_what_ships_has_the_fields_that_are_written(figures: dict) -> None:
 def test_bursts_that_no_pose_is_found_for_are_refused(tmp_path: Path) -> None:
     agreement = AGREEMENT.copy()
     agreement[0, 1] = np.nan
-    with pytest.raises(InvalidInput, match="all need both"):
+    with pytest.raises(InvalidInput, match="leave them out"):
         write(tmp_path / "decision.json", "any", LABELS, MATCH, agreement)
     assert not list(tmp_path.iterdir())
