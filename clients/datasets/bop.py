@@ -24,6 +24,7 @@ from core.errors import InvalidInput
 from core.sim3 import Sim3
 from core.views import Camera, FloatArray, View
 
+MODELS = "models_info.json"
 TURNS = 72
 """Rotations that stand for a continuous symmetry: 5° apart."""
 
@@ -108,19 +109,23 @@ def _sequence(scene: Path, instance: str, number: int, sights: list[Sight], mode
     world_from_model, longest = None, None
     if model:
         camera_from_model = _camera_from_model(scene, sights[0], truth)
-        sides = np.array([model["size_x"], model["size_y"], model["size_z"]]) / 1000
-        centre = np.array([model["min_x"], model["min_y"], model["min_z"]]) / 1000 + sides / 2
+        low, sides = (_along_axes(model, part, f"{MODELS}: {number}.") / 1000 for part in ("min", "size"))
+        centre = low + sides / 2
         frame = Sim3(float(np.linalg.norm(sides)), np.eye(3), centre)
         within = f"{scene / CAMERAS}: {sights[0].key}."
         pose = _camera(cameras[sights[0].key], camera_from_model, within).world_from_camera @ camera_from_model
         world_from_model, longest = Sim3.from_matrix(pose) @ frame, float(sides.max())
     images = tuple(sight.image for sight in sights)
-    symmetries = _symmetries(model or {}, f"models_info.json: {number}")
+    symmetries = _symmetries(model or {}, f"{MODELS}: {number}.")
     return folders.Sequence(scene, f"{number:06}", instance, images, world_from_model, symmetries, BopReader(tuple(sights)), longest)
 
 
+def _along_axes(model: Mapping[str, Any], part: str, within: str) -> FloatArray:
+    return np.array([folders.read_numbers(model, f"{part}_{axis}", (), within) for axis in "xyz"])
+
+
 def _camera(entry: Mapping[str, Any], camera_from_model: FloatArray, within: str) -> Camera:
-    if "cam_R_w2c" in entry:
+    if isinstance(entry, Mapping) and "cam_R_w2c" in entry:
         return folders.read_camera(entry, within)
     return folders.camera_of(folders.read_numbers(entry, "cam_K", (3, 3), within), np.linalg.inv(camera_from_model), within)
 
@@ -134,12 +139,15 @@ def _camera_from_model(scene: Path, sight: Sight, truth: Mapping[str, Any]) -> F
     return pose
 
 
-def _symmetries(model: Mapping[str, Any], field: str) -> tuple[FloatArray, ...]:
+def _symmetries(model: Mapping[str, Any], within: str) -> tuple[FloatArray, ...]:
     """Rotations, each (3, 3), of `symmetries_discrete`, and of `symmetries_continuous` in steps of 360° / TURNS."""
-    discrete = tuple(folders.read_symmetry(matrix, f"{field}.symmetries_discrete") for matrix in model.get("symmetries_discrete", ()))
+    discrete = tuple(folders.read_symmetry(matrix, f"{within}symmetries_discrete") for matrix in model.get("symmetries_discrete", ()))
     turned = tuple(
         np.asarray(cv2.Rodrigues(angle * axis / np.linalg.norm(axis))[0])
-        for axis in (np.array(symmetry["axis"], dtype=float) for symmetry in model.get("symmetries_continuous", ()))
+        for axis in (
+            folders.read_numbers(symmetry, "axis", (3,), f"{within}symmetries_continuous.")
+            for symmetry in model.get("symmetries_continuous", ())
+        )
         for angle in np.arange(1, TURNS) * (2 * np.pi / TURNS)
     )
     return discrete + turned
@@ -148,7 +156,7 @@ def _symmetries(model: Mapping[str, Any], field: str) -> tuple[FloatArray, ...]:
 def _models(root: Path) -> dict[str, Any]:
     """models_info.json of the data set, which may be named by one of its splits or scenes."""
     for folder in (root, *list(root.resolve().parents)[:2]):
-        found = sorted(folder.glob("models*/models_info.json"))
+        found = sorted(folder.glob(f"models*/{MODELS}"))
         if found:
             return folders.read_json(found[0])
     return {}

@@ -185,7 +185,10 @@ def camera_of(K: FloatArray, world_from_camera: FloatArray, within: str) -> Came
 def read_numbers(entry: Mapping[str, Any], name: str, shape: tuple[int, ...], within: str) -> FloatArray:
     """An entry's numbers, row by row, as an array of `shape`. Raises InvalidInput naming them after `within`, such as `FILE: 7.`."""
     try:
-        return np.array(entry[name], dtype=float).reshape(shape)
+        numbers = np.array(entry[name], dtype=float).reshape(shape)
+        if not np.isfinite(numbers).all():  # null, too
+            raise ValueError
+        return numbers
     except (KeyError, TypeError, ValueError):
         count = math.prod(shape)
         expected = f"{count} numbers, row by row" if count > 1 else "a number"

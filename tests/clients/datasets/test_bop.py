@@ -126,6 +126,7 @@ def test_linked_folders_are_followed_once(root: Path) -> None:
         ("scene_gt.json", lambda scene: scene["0"][0].pop("cam_t_m2c"), "0[0].cam_t_m2c"),
         ("scene_gt.json", lambda scene: scene["0"][0]["cam_R_m2c"].pop(), "0[0].cam_R_m2c"),
         ("scene_camera.json", lambda scene: scene["0"].pop("depth_scale"), "0.depth_scale"),
+        ("scene_camera.json", lambda scene: scene.update({"0": 7}), "0.cam_K"),
         ("scene_gt.json", lambda scene: scene["0"][0].pop("obj_id"), "0[0].obj_id"),
     ],
 )
@@ -137,6 +138,24 @@ def test_what_is_wrong_with_a_scene_is_named(root: Path, file: str, change: Call
     with pytest.raises(InvalidInput, match="expected .*number") as caught:
         load_burst(bop.find_sequences(root)[0])
     assert caught.value.field == f"{path}: {field}"
+
+
+@pytest.mark.parametrize(
+    ("change", "field"),
+    [
+        (lambda models: models["5"].pop("size_y"), "5.size_y"),
+        (lambda models: models["5"].update(min_x=None), "5.min_x"),
+        (lambda models: models["5"].update(symmetries_continuous=[{"offset": [0, 0, 0]}]), "5.symmetries_continuous.axis"),
+    ],
+)
+def test_what_is_wrong_with_a_model_is_named(root: Path, change: Callable[[Any], object], field: str) -> None:
+    path = root / "models" / "models_info.json"
+    models = json.loads(path.read_text())
+    change(models)
+    path.write_text(json.dumps(models))
+    with pytest.raises(InvalidInput, match="expected .*number") as caught:
+        bop.find_sequences(root)
+    assert caught.value.field == f"models_info.json: {field}"
 
 
 def test_an_image_without_a_number_is_named(root: Path) -> None:
