@@ -12,13 +12,12 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.pair_jobs import PairJob, pair_jobs
-from benchmarks.pairs import ViewCounts
+from benchmarks.pairs import UNPOSED, ViewCounts
 from benchmarks.parallel import map_jobs
 from benchmarks.tables import report
 from core.backbones import load_backbone
 from core.best_pose import BestConfig
 from core.encode import Encoder
-from core.errors import InvalidInput, NoPose
 from core.hypotheses import HypothesesConfig
 from core.pose import VARIANTS, PoseConfig, PoseEstimator
 
@@ -77,7 +76,7 @@ def solve(job: PairJob) -> dict[str, float]:
     for change, config in CHANGES.items():
         try:
             found = job.errors_deg(PoseEstimator(_config(config)).estimate(reference, target, seed=job.seed))
-        except (NoPose, InvalidInput):  # nothing fits, or the views show nothing of the object
+        except UNPOSED:
             found = [180.0]
         errors[change] = min(found) if change == ORACLE else found[0]
     return errors

@@ -102,7 +102,9 @@ def found_mask(view: EncodedView, height: int, width: int) -> NDArray[np.bool_]:
 
 
 def _has_silhouettes(sequence: folders.Sequence) -> bool:
-    return any(view.mask is not None for view in folders.load_burst(sequence, masks=True).views)
+    """One view is read after the other: mostly the first has one."""
+    indices = range(len(sequence.images))
+    return any(folders.load_burst(sequence, [index], masks=True).views[0].mask is not None for index in indices)
 
 
 def _scores(sequence: folders.Sequence, file: Path) -> list[Overlap]:

@@ -9,10 +9,12 @@ from zlib import crc32
 import numpy as np
 
 from clients.datasets import folders
-from core.errors import InvalidInput
+from core.errors import InvalidInput, NoPose
 
 Pair = tuple[folders.Sequence, folders.Sequence]
 """(reference, target)"""
+UNPOSED = (NoPose, InvalidInput)
+"""What an estimate raises where nothing fits, or the target's views show nothing of the object."""
 
 
 @dataclass(frozen=True)

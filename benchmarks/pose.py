@@ -20,7 +20,7 @@ from benchmarks.box_iou import Parallelepiped, box_iou
 from benchmarks.contenders import Found, Setting, Sweep
 from benchmarks.encoded import read_views
 from benchmarks.pair_jobs import encode_pairs, seen_views
-from benchmarks.pairs import Pair, require_views, sample_pairs
+from benchmarks.pairs import UNPOSED, Pair, require_views, sample_pairs
 from benchmarks.parallel import map_jobs, worker_count
 from benchmarks.tables import report
 from clients.datasets import folders
@@ -29,7 +29,6 @@ from clients.pose_error import NO_POSE, PoseError, accuracy, median, pose_error,
 from core.backbones import load_backbone
 from core.boxes import remove_outliers
 from core.encode import EncodedBurst, Encoder
-from core.errors import InvalidInput, NoPose
 from core.sim3 import Sim3
 from core.views import FloatArray
 
@@ -164,7 +163,7 @@ def solve(job: Job) -> JobResult:
         started = time.perf_counter()
         try:
             found = way.find(kept, target, job.seed)
-        except (NoPose, InvalidInput):  # nothing fits, or the views show nothing of the object
+        except UNPOSED:
             found = None
         solve_ms.append(1000 * (time.perf_counter() - started))
         scores.append(_score(found, job, sequence))

@@ -18,13 +18,13 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from benchmarks.pair_jobs import PairJob, pair_jobs
+from benchmarks.pairs import UNPOSED
 from benchmarks.parallel import map_jobs
 from benchmarks.pictures import save
 from benchmarks.tables import print_table, write_json
 from core.backbones import load_backbone
 from core.confidence import SHIPPED, Confidence, evidence
 from core.encode import Encoder
-from core.errors import InvalidInput, NoPose
 from core.pose import VARIANTS, PoseEstimator
 
 RIGHT_DEG = 30.0
@@ -106,7 +106,7 @@ def judge(job: PairJob) -> Judged | None:
     reference, target = job.reference(), job.target()
     try:
         estimate = PoseEstimator(VARIANTS["best"]).estimate(reference, target, seed=job.seed)
-    except (NoPose, InvalidInput):  # nothing fits, or the views show nothing of the object
+    except UNPOSED:
         return None
     assert estimate.score is not None, "of the variant best"
     scores = np.array([estimate.score, *(each.score for each in estimate.alternatives)])

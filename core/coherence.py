@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from core.boxes import cloud_extent_m
 from core.encode import EncodedBurst, EncodedView
@@ -49,6 +50,21 @@ class _Sights:
     measured: FloatArray
     """Share of the patches that have such points, shape (V,)."""
 
+    @property
+    def away_m(self) -> FloatArray:
+        """How far from where the views have the object together each has it, shape (V,)."""
+        return np.asarray(np.linalg.norm(self.centers - np.median(self.centers, axis=0), axis=1))
+
+    @property
+    def extent_m(self) -> float:
+        """Of the object, as most views have it."""
+        return float(np.median(self.extents_m))
+
+    @property
+    def elsewhere(self) -> NDArray[np.bool_]:
+        """Which views have the object too far away, shape (V,)."""
+        return np.asarray(self.away_m > ELSEWHERE * self.extent_m)
+
 
 def require_one_unit(encoded: EncodedBurst) -> None:
     """Raises InvalidInput where the rays to the object meet at quite another distance than depth says."""
@@ -83,13 +99,12 @@ def require_one_place(encoded: EncodedBurst) -> None:
     sights = _sights(encoded)
     if sights is None or np.median(sights.measured) < LEAST_MEASURED:
         return
-    away_m, extent_m = _away_m(sights), float(np.median(sights.extents_m))
-    if (away_m > ELSEWHERE * extent_m).mean() > MOST_ELSEWHERE:
+    if sights.elsewhere.mean() > MOST_ELSEWHERE:
         raise InvalidInput(
             "views",
-            f"each has the object in another place, {np.median(away_m):.2g} m from the middle of all, though it is {extent_m:.2g} m large; "
-            "where it did not move, world_from_camera is wrong: expected from camera (x right, y down, z forward, as OpenCV has it) to "
-            "world, not the inverse and not OpenGL's axes",
+            f"each has the object in another place, {np.median(sights.away_m):.2g} m from the middle of all, though it is "
+            f"{sights.extent_m:.2g} m large; where it did not move, world_from_camera is wrong: expected from camera (x right, y down, z "
+            "forward, as OpenCV has it) to world, not the inverse and not OpenGL's axes",
         )
 
 
@@ -104,16 +119,10 @@ def _elsewhere(encoded: EncodedBurst) -> Iterator[tuple[int, ViewFault]]:
     sights = _sights(encoded)
     if sights is None:
         return
-    limit_m = ELSEWHERE * float(np.median(sights.extents_m))
-    for view, distance_m in zip(sights.views, _away_m(sights)):
-        if distance_m > limit_m:
+    for view, distance_m, elsewhere in zip(sights.views, sights.away_m, sights.elsewhere):
+        if elsewhere:
             detail = f"what it shows is {distance_m:.2g} m from where the other views have the object: another object, or a wrong camera"
             yield view, ViewFault("elsewhere", detail)
-
-
-def _away_m(sights: _Sights) -> FloatArray:
-    """How far from where the views have the object together each has it, shape (V,)."""
-    return np.asarray(np.linalg.norm(sights.centers - np.median(sights.centers, axis=0), axis=1))
 
 
 def _copies(burst: Burst) -> Iterator[tuple[int, ViewFault]]:

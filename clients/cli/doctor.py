@@ -8,6 +8,7 @@ import sys
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
 from enum import Enum
+from functools import cache
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -160,7 +161,7 @@ def weights(settings: Settings) -> Finding:
     """The backbone's, where they are on this machine: loaded, to see that they are whole."""
     from core.backbones.weights import cache_folder
 
-    loaded = _backbone_here(settings)
+    loaded = _backbone_here(settings.backbone)
     if loaded is None:
         remedy = "the first start downloads 90 MB; without a network copy the cache folder of a machine that has them"
         return Finding("weights", State.poor, f"not in {cache_folder()} yet", remedy)
@@ -179,7 +180,7 @@ def memory(settings: Settings) -> Finding:
         return Finding("memory", State.bad, f"{place} cannot be written", "name another folder with ONELOOK_DATA_DIR or --data-dir")
     with Memory.reading(settings.data_dir) as stored:
         made_with, fingerprint, count = stored.backbone, stored.fingerprint, len(stored.categories.all())
-    loaded = _backbone_here(settings)
+    loaded = _backbone_here(settings.backbone)
     same = made_with == settings.backbone if loaded is None else fingerprint == loaded.fingerprint
     if fingerprint is not None and not same:
         found = f"{settings.data_dir} was made with {made_with} (fingerprint {fingerprint[:12]}), which is not this {settings.backbone}"
@@ -230,14 +231,15 @@ def port(settings: Settings) -> Finding:
         return Finding("port", State.bad, f"{url}: {refused}", remedy)
 
 
-def _backbone_here(settings: Settings) -> Backbone | None:
-    """The backbone; None where its weights would first have to be fetched."""
+@cache
+def _backbone_here(name: str) -> Backbone | None:
+    """The backbone, which takes long to load; None where its weights would first have to be fetched."""
     from core.backbones import EMBEDDED, load_backbone
     from core.backbones.weights import FOLDER_NAME, cache_folder
 
-    if settings.backbone == EMBEDDED and not (cache_folder() / FOLDER_NAME).is_dir():
+    if name == EMBEDDED and not (cache_folder() / FOLDER_NAME).is_dir():
         return None
-    return load_backbone(settings.backbone)
+    return load_backbone(name)
 
 
 def _why_not(library: str) -> Exception | None:

@@ -53,7 +53,8 @@ def simulate(
     if data is not None and world is None:
         given["world"] = WorldKind.replay.value
     plan = check(replace(base, **{name: value for name, value in given.items() if value is not None}))
-    plan.subjects()  # says what there is none of before the memory of a former run is deleted
+    # Says what there is none of before the memory of a former run is deleted.
+    subjects = [plan.subjects(robot) for robot in range(plan.robots)]
     output = Output(out)
     out.mkdir(parents=True, exist_ok=True)
     if resume:
@@ -61,9 +62,9 @@ def simulate(
     screen = errors if json else console
     with service(url, out, fresh=not resume) as address:
         summary: Any = (
-            run_lessons(plan, address, output, screen, resume=resume)
+            run_lessons(plan, subjects[0], address, output, screen, resume=resume)
             if plan.teacher
-            else run_episode(plan, address, output, screen, resume=resume)
+            else run_episode(plan, subjects, address, output, screen, resume=resume)
         )
     if json:
         print_json(asdict(summary))

@@ -50,8 +50,13 @@ class Output:
         return [Lesson(**json.loads(line)) for line in interrupted(self.lessons, script.as_settings())]
 
 
-def run_episode(script: Script, url: str, output: Output, console: Console, *, resume: bool = False) -> Summary:
-    """All encounters, the report and the JSON; returns the figures. Raises ClientError where the memory is not this episode's."""
+def run_episode(
+    script: Script, subjects: Sequence[Sequence[Subject]], url: str, output: Output, console: Console, *, resume: bool = False
+) -> Summary:
+    """All encounters, the report and the JSON; returns the figures. Raises ClientError where the memory is not this episode's.
+
+    `subjects` are the script's, of each robot: drawing them takes seconds.
+    """
     done = output.earlier(script) if resume else []
     started = time.perf_counter()
     with ExitStack() as clients:
@@ -62,7 +67,7 @@ def run_episode(script: Script, url: str, output: Output, console: Console, *, r
         episodes = []
         for number, robot in enumerate(robots):
             own = [each for each in done if each.robot == number]
-            episodes.append(Episode(robot, script.subjects(number), conduct, done=own, truth=truth, number=number))
+            episodes.append(Episode(robot, subjects[number], conduct, done=own, truth=truth, number=number))
         total = sum(len(each.subjects) for each in episodes)
         met = together(episodes) if len(episodes) > 1 else iter(episodes[0])
         live_ones = kept(met, output.lines, script.as_settings(), Encounter.as_json, done)
@@ -81,10 +86,12 @@ def run_episode(script: Script, url: str, output: Output, console: Console, *, r
     return summary
 
 
-def run_lessons(script: Script, url: str, output: Output, console: Console, *, resume: bool = False) -> TeachingSummary:
-    """All that the teacher does; returns what the protocol reports."""
+def run_lessons(
+    script: Script, subjects: Sequence[Subject], url: str, output: Output, console: Console, *, resume: bool = False
+) -> TeachingSummary:
+    """All that the teacher does with the script's subjects; returns what the protocol reports."""
     groups: dict[str, list[Subject]] = {}
-    for subject in script.subjects():
+    for subject in subjects:
         groups.setdefault(subject.category, []).append(subject)
     done = output.earlier_lessons(script) if resume else []
     with RobotClient(url) as robot:

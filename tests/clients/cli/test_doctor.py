@@ -27,6 +27,7 @@ def machine(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("ONELOOK_DATA_DIR", str(tmp_path / "memory"))
     monkeypatch.setenv("ONELOOK_CACHE", str(tmp_path / "cache"))
     (tmp_path / "cache" / FOLDER_NAME).mkdir(parents=True)
+    doctor._backbone_here.cache_clear()
     monkeypatch.setattr(core.backbones, "load_backbone", lambda name: SimpleNamespace(name=name, fingerprint="0123456789abcdef"))
     with socket.create_server(("127.0.0.1", 0)) as taken:
         free = taken.getsockname()[1]
