@@ -106,6 +106,7 @@ def test_a_merge_is_previewed_done_and_taken_back(tab, cup, tv, robot):
     page.get_by_role("radio", name="tv").check()
     page.get_by_role("button", name="See what changes").click()
     expect(page.get_by_text("1 + 2 = 3")).to_be_visible()
+    page.wait_for_load_state("networkidle")  # else its pictures would be asked for when it is gone
     page.get_by_role("button", name="Merge", exact=True).click()
     expect(page.get_by_role("heading", name="tv", level=1)).to_be_visible()
     assert [each.name for each in robot.categories()] == ["tv"]
